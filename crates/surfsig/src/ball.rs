@@ -1,0 +1,290 @@
+//! The walk over the points of a ball, and the two traits that meet there.
+//!
+//! A [`BallVisitor`] is told the members of a ball, block by block; what it makes of them is its own
+//! affair: moments today, a robust re-weighting or a pooled descriptor as well. A [`MomentSource`]
+//! gives the 35 sums of a ball, whichever way it comes by them.
+
+use crate::cell_index::{CellIndex, Row, RowKey};
+use crate::moments::{Moments, Scalar};
+use crate::simd::InstructionSet;
+use crate::simd::accumulate::accumulate;
+use crate::simd::select::{BALL_LIMIT, BLOCK, Block, PADDING, PIECE, Placement, RowPiece, select};
+
+/// Sees every point of a ball once, in the order of the lattice.
+pub(crate) trait BallVisitor {
+    /// Whether [`Block::rank`] must be filled.
+    const WANTS_RANKS: bool;
+
+    /// The first `len` members of the block: offsets from the query in units of the radius. The
+    /// slots from there to the next multiple of 16 are zero.
+    fn visit(&mut self, block: &Block, len: usize);
+}
+
+/// Gives the moments of the ball around a query.
+///
+/// Queries come in runs: [`enter_row`](Self::enter_row), then [`enter_run`](Self::enter_run) for
+/// some queries near to each other in that row, then [`moments`](Self::moments) for each. What
+/// queries share can so be prepared once.
+pub(crate) trait MomentSource {
+    /// The queries that follow are in this row of the lattice.
+    fn enter_row(&mut self, key: RowKey);
+
+    /// The queries that follow have their offsets from the row's middle in this box.
+    fn enter_run(&mut self, low: [f32; 3], high: [f32; 3]);
+
+    /// The moments of the ball around the query at this offset from the row's middle, about the
+    /// query, in units of the radius. `S` is what the sums within a block are kept in.
+    fn moments<S: Scalar>(&mut self, offset: [f32; 3]) -> Moments<f64>;
+}
+
+/// A row that balls around the present row's queries may reach.
+struct NearRow {
+    row: Row,
+    /// From the middle of the present row to the middle of this one, in units of the radius.
+    between: [f64; 3],
+    /// Where the row's cells begin and end along y and z, from the middle of the present row.
+    low: [f32; 2],
+    high: [f32; 2],
+    /// The same along x, from the middle of this row: its first and last point.
+    ends: [f32; 2],
+    /// From the middle of the present row to the middle of this one, along x.
+    along: f32,
+    /// The points of the row that the present run's balls may reach.
+    window: std::ops::Range<usize>,
+}
+
+/// Walks over the points themselves: the plain way, and the reference of every other.
+pub(crate) struct DirectWalk<'a> {
+    index: &'a CellIndex,
+    set: InstructionSet,
+    scale: f32,
+    near: Vec<NearRow>,
+    /// Those of `near` whose window is not empty.
+    in_reach: Vec<usize>,
+    block: Box<Block>,
+}
+
+impl<'a> DirectWalk<'a> {
+    pub fn new(index: &'a CellIndex, set: InstructionSet) -> Self {
+        let scale = (1.0 / index.lattice.radius) as f32;
+        Self { index, set, scale, near: Vec::new(), in_reach: Vec::new(), block: Box::new(Block::new()) }
+    }
+
+    /// Shows a visitor the members of the ball around the query at this offset.
+    pub fn visit<V: BallVisitor>(&mut self, offset: [f32; 3], visitor: &mut V) {
+        let scale = f64::from(self.scale);
+        let half_step = (self.index.lattice.half_step() * scale) as f32;
+        let query = offset.map(|o| f64::from(o) * scale);
+        self.block.len = 0;
+        for &near in &self.in_reach {
+            let NearRow { between, window, .. } = &self.near[near];
+            let shift = [0, 1, 2].map(|axis| (between[axis] - query[axis]) as f32);
+            let gap = [1, 2].map(|axis| (shift[axis].abs() - half_step).max(0.0));
+            if gap[0] * gap[0] + gap[1] * gap[1] > BALL_LIMIT {
+                continue;
+            }
+            let placement = Placement { scale: self.scale, shift };
+            for start in window.clone().step_by(PIECE) {
+                let len = PIECE.min(window.end - start);
+                let readable = start..start + len + PADDING;
+                let piece = RowPiece {
+                    x: &self.index.x[readable.clone()],
+                    y: &self.index.y[readable.clone()],
+                    z: &self.index.z[readable],
+                    len,
+                    first_rank: start as u32,
+                };
+                if V::WANTS_RANKS {
+                    select::<true>(self.set, piece, placement, &mut self.block);
+                } else {
+                    select::<false>(self.set, piece, placement, &mut self.block);
+                }
+                while self.block.len >= BLOCK {
+                    visitor.visit(&self.block, BLOCK);
+                    self.block.carry_over();
+                }
+            }
+        }
+        let len = self.block.len;
+        let padding = len..len.next_multiple_of(PADDING);
+        self.block.x[padding.clone()].fill(0.0);
+        self.block.y[padding.clone()].fill(0.0);
+        self.block.z[padding].fill(0.0);
+        visitor.visit(&self.block, len);
+    }
+}
+
+impl MomentSource for DirectWalk<'_> {
+    fn enter_row(&mut self, key: RowKey) {
+        self.near.clear();
+        let (reach, reach_along_row) = self.index.lattice.reach();
+        for dz in -reach..=reach {
+            for dy in -reach..=reach {
+                for dx in -reach_along_row..=reach_along_row {
+                    let near = RowKey { z: key.z + dz, y: key.y + dy, x: key.x + dx };
+                    if let Some(&row) = self.index.row(near) {
+                        let between = self.index.lattice.between(key, near);
+                        let half_step = self.index.lattice.half_step();
+                        self.near.push(NearRow {
+                            row,
+                            between: between.map(|b| b * f64::from(self.scale)),
+                            low: [1, 2].map(|axis| (between[axis] - half_step) as f32),
+                            high: [1, 2].map(|axis| (between[axis] + half_step) as f32),
+                            ends: [self.index.x[row.start], self.index.x[row.end - 1]],
+                            along: between[0] as f32,
+                            window: row.start..row.start,
+                        });
+                    }
+                }
+            }
+        }
+    }
+
+    fn enter_run(&mut self, low: [f32; 3], high: [f32; 3]) {
+        // A window may be too long, never too short: a little more than the ball's own slack, and
+        // than float32 can lose over the length of a row.
+        let reach = self.index.lattice.radius as f32 * (1.0 + 2e-5);
+        let x = &self.index.x;
+        self.in_reach.clear();
+        for (number, near) in self.near.iter_mut().enumerate() {
+            // Distance along y and z from the run's box to the row's cells.
+            let gap_y = (near.low[0] - high[1]).max(low[1] - near.high[0]).max(0.0);
+            let gap_z = (near.low[1] - high[2]).max(low[2] - near.high[1]).max(0.0);
+            let square = reach * reach - gap_y * gap_y - gap_z * gap_z;
+            if square < 0.0 {
+                continue;
+            }
+            let chord = square.sqrt() + 1e-5 * reach;
+            let (from, to) = (low[0] - near.along - chord, high[0] - near.along + chord);
+            if from > near.ends[1] || to < near.ends[0] {
+                continue;
+            }
+            let row = near.row.start..near.row.end;
+            let start = seek(x, row.clone(), near.window.start, |v| v < from);
+            let end = seek(x, start..row.end, near.window.end.max(start), |v| v <= to);
+            near.window = start..end;
+            if start < end {
+                self.in_reach.push(number);
+            }
+        }
+    }
+
+    fn moments<S: Scalar>(&mut self, offset: [f32; 3]) -> Moments<f64> {
+        let mut sums =
+            BlockSums::<S> { set: self.set, total: Moments::default(), scalar: std::marker::PhantomData };
+        self.visit(offset, &mut sums);
+        sums.total
+    }
+}
+
+/// First place in `range` at which `before` no longer holds, sought from a place that is near to it.
+#[inline]
+fn seek(x: &[f32], range: std::ops::Range<usize>, from: usize, before: impl Fn(f32) -> bool) -> usize {
+    let (mut low, mut high) = (range.start, range.end);
+    let mut probe = from.clamp(low, high);
+    // Gallop away from the last place until the answer lies between.
+    let mut stride = 4;
+    if probe < high && before(x[probe]) {
+        while probe < high && before(x[probe]) {
+            low = probe + 1;
+            probe += stride;
+            stride *= 2;
+        }
+        high = probe.min(high);
+    } else {
+        while probe > low && !before(x[probe - 1]) {
+            high = probe - 1;
+            probe = probe.saturating_sub(stride).max(low);
+            stride *= 2;
+        }
+        low = probe;
+    }
+    low + x[low..high].partition_point(|&v| before(v))
+}
+
+/// The visitor that sums: blocks in `S`, their totals in `f64`.
+struct BlockSums<S> {
+    set: InstructionSet,
+    total: Moments<f64>,
+    scalar: std::marker::PhantomData<S>,
+}
+
+impl<S: Scalar> BallVisitor for BlockSums<S> {
+    const WANTS_RANKS: bool = false;
+
+    fn visit(&mut self, block: &Block, len: usize) {
+        let sums = accumulate::<S>(self.set, block, len);
+        for (total, sum) in self.total.sums.iter_mut().zip(sums) {
+            *total += sum.to_f64();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{PointCloud, Radius};
+    use proptest::prelude::*;
+
+    struct Collect<'a>(&'a CellIndex, Vec<u32>);
+
+    impl BallVisitor for Collect<'_> {
+        const WANTS_RANKS: bool = true;
+        fn visit(&mut self, block: &Block, len: usize) {
+            self.1.extend(block.rank[..len].iter().map(|&rank| self.0.point_of_rank[rank as usize]));
+        }
+    }
+
+    fn members(cloud: &PointCloud<'_>, radius: f64, query: [f64; 3]) -> Vec<u32> {
+        let index = CellIndex::new(cloud, Radius::new(radius).unwrap()).unwrap();
+        let (key, offset) = index.lattice.place(query).unwrap();
+        let mut walk = DirectWalk::new(&index, InstructionSet::detect());
+        walk.enter_row(key);
+        walk.enter_run(offset, offset);
+        let mut found = Collect(&index, Vec::new());
+        walk.visit(offset, &mut found);
+        found.1.sort_unstable();
+        found.1
+    }
+
+    proptest! {
+        #[test]
+        fn the_ball_holds_exactly_the_points_within_the_radius(
+            points in prop::collection::vec(prop::array::uniform3(-1.0_f64..1.0), 0..400),
+            radius in 0.01_f64..3.0,
+            origin in prop::array::uniform3(-5e6_f64..5e6),
+        ) {
+            let query = origin;
+            let points: Vec<[f64; 3]> = points.iter().map(|p| [0, 1, 2].map(|a| p[a] + origin[a])).collect();
+            let square = |p: &[f64; 3]| (0..3).map(|a| (p[a] - query[a]).powi(2)).sum::<f64>() / (radius * radius);
+            // Between the two limits, float32 may decide either way.
+            prop_assume!(points.iter().all(|p| (square(p) - 1.00001).abs() > 5e-6));
+            let expected: Vec<u32> = (0..points.len()).filter(|&i| square(&points[i]) < 1.00001).map(|i| i as u32).collect();
+            prop_assert_eq!(members(&PointCloud::new_f64(&points), radius, query), expected);
+        }
+    }
+
+    #[test]
+    fn points_of_a_grid_that_lie_on_the_sphere_belong_to_the_ball_wherever_the_grid_is() {
+        // 4 mm grid, 20 mm ball: (12, 16) and its like lie exactly on the circle.
+        for origin in [[0.0, 0.0, 0.0], [500_000.0, 4_500_000.0, 100.0], [0.0013, -0.0007, 1e6]] {
+            let points: Vec<[f64; 3]> = (-8..=8)
+                .flat_map(|i| (-8..=8).map(move |j| [0.004 * f64::from(i), 0.004 * f64::from(j), 0.0]))
+                .map(|p| [0, 1, 2].map(|a| p[a] + origin[a]))
+                .collect();
+            let centre = points[8 * 17 + 8];
+            assert_eq!(members(&PointCloud::new_f64(&points), 0.02, centre).len(), 81);
+        }
+    }
+
+    #[test]
+    fn seek_finds_the_first_place_from_anywhere() {
+        let x: Vec<f32> = (0..200).map(|i| (i / 3) as f32).collect();
+        for target in [-1.0, 0.0, 0.5, 20.0, 66.0, 70.0] {
+            let expected = 10 + x[10..190].iter().filter(|v| **v < target).count();
+            for from in [0, 10, 11, 50, 100, 189, 190, 500] {
+                assert_eq!(seek(&x, 10..190, from, |v| v < target), expected);
+            }
+        }
+    }
+}

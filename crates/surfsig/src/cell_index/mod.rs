@@ -1,0 +1,162 @@
+//! Points sorted into rows of cells, to be streamed: the sparse index of a cloud for one radius.
+
+mod lattice;
+
+pub(crate) use lattice::{Lattice, RowKey};
+
+use crate::simd::select::PADDING;
+use crate::{Error, PointCloud, Radius};
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+/// A row: its key, and where its points begin. They end where the next row's begin.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row {
+    pub key: RowKey,
+    pub start: usize,
+    pub end: usize,
+}
+
+/// The points of a cloud in rows of an absolute lattice, each row in ascending x.
+///
+/// Only rows that hold points exist: an outlier a million metres away is one more row.
+///
+/// ```
+/// use surfsig::{CellIndex, PointCloud, Radius};
+/// let points = [[0.0_f32, 0.0, 0.0], [0.01, 0.0, 0.0], [f32::NAN, 0.0, 0.0], [1e6, 0.0, 0.0]];
+/// let index = CellIndex::new(&PointCloud::new(&points), Radius::new(0.02)?)?;
+/// assert_eq!(index.len(), 3);
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct CellIndex {
+    pub(crate) lattice: Lattice,
+    pub(crate) rows: Vec<Row>,
+    row_of_key: FxHashMap<RowKey, u32>,
+    /// Offsets from the middle of the point's row, padded so that a vector may overrun the end.
+    pub(crate) x: Vec<f32>,
+    pub(crate) y: Vec<f32>,
+    pub(crate) z: Vec<f32>,
+    /// The cloud's own number of each point.
+    pub(crate) point_of_rank: Vec<u32>,
+}
+
+impl CellIndex {
+    /// Sorts the finite points of a cloud for balls of one radius.
+    ///
+    /// # Errors
+    /// [`Error::RadiusBelowResolution`] where float64 cannot tell the lattice's cells apart at a
+    /// point's coordinates; [`Error::TooManyPoints`] beyond 2^32 - 1 points.
+    pub fn new(cloud: &PointCloud<'_>, radius: Radius) -> Result<Self, Error> {
+        Self::of_positions(cloud.len(), |i| cloud.position(i), radius)
+    }
+
+    /// As [`CellIndex::new`], for positions that are computed; `None` is left out.
+    pub(crate) fn of_positions(
+        len: usize,
+        position: impl Fn(usize) -> Option<[f64; 3]> + Sync,
+        radius: Radius,
+    ) -> Result<Self, Error> {
+        const NOWHERE: u32 = u32::MAX;
+        if len >= NOWHERE as usize {
+            return Err(Error::TooManyPoints(len));
+        }
+        let lattice = Lattice::new(radius);
+
+        // Which row each point is in; rows are numbered as they are met.
+        let mut met: FxHashMap<RowKey, u32> = FxHashMap::default();
+        let mut keys: Vec<(RowKey, usize)> = Vec::new();
+        let mut row_of_point = vec![NOWHERE; len];
+        let mut last = None;
+        for (i, row) in row_of_point.iter_mut().enumerate() {
+            let Some(p) = position(i) else { continue };
+            let (key, _) = lattice.place(p)?;
+            // Neighbours in a file are often neighbours in space.
+            *row = match last {
+                Some((last_key, last_row)) if last_key == key => last_row,
+                _ => *met.entry(key).or_insert_with(|| {
+                    keys.push((key, 0));
+                    keys.len() as u32 - 1
+                }),
+            };
+            last = Some((key, *row));
+            keys[*row as usize].1 += 1;
+        }
+
+        // Rows in the order of their keys, which is that of the lattice.
+        let mut order: Vec<u32> = (0..keys.len() as u32).collect();
+        order.par_sort_unstable_by_key(|&row| keys[row as usize].0);
+        let mut rows = Vec::with_capacity(keys.len());
+        let mut cursor = vec![0; keys.len()];
+        let mut start = 0;
+        for (sorted, &row) in order.iter().enumerate() {
+            let (key, count) = keys[row as usize];
+            rows.push(Row { key, start, end: start + count });
+            cursor[row as usize] = start;
+            start += count;
+            met.insert(key, sorted as u32);
+        }
+
+        // Deal the points to their rows, then sort each row along x; equal x keep the cloud's order.
+        let mut point_of_rank = vec![0_u32; start];
+        for (i, &row) in row_of_point.iter().enumerate().filter(|(_, row)| **row != NOWHERE) {
+            let slot = &mut cursor[row as usize];
+            point_of_rank[*slot] = i as u32;
+            *slot += 1;
+        }
+        drop(row_of_point);
+        let [mut x, mut y, mut z] = std::array::from_fn(|_| vec![0.0_f32; start + PADDING]);
+        let mut work = Vec::with_capacity(rows.len());
+        let (mut px, mut py, mut pz, mut pr) = (&mut x[..], &mut y[..], &mut z[..], &mut point_of_rank[..]);
+        for row in &rows {
+            let split = row.end - row.start;
+            work.push((
+                px.split_off_mut(..split).expect("as many slots as points"),
+                py.split_off_mut(..split).expect("as many slots as points"),
+                pz.split_off_mut(..split).expect("as many slots as points"),
+                pr.split_off_mut(..split).expect("as many slots as points"),
+            ));
+        }
+        work.into_par_iter().with_min_len(16).for_each_init(Vec::new, |offsets, (x, y, z, ranks)| {
+            offsets.clear();
+            offsets.extend(ranks.iter().map(|&i| {
+                let place = position(i as usize).map(|p| lattice.place(p));
+                let Some(Ok((_, offset))) = place else { unreachable!("placed a moment ago") };
+                (offset, i)
+            }));
+            offsets.sort_unstable_by(|(a, i), (b, j)| a[0].total_cmp(&b[0]).then(i.cmp(j)));
+            for (slot, &(offset, i)) in offsets.iter().enumerate() {
+                ([x[slot], y[slot], z[slot]], ranks[slot]) = (offset, i);
+            }
+        });
+        Ok(Self { lattice, rows, row_of_key: met, x, y, z, point_of_rank })
+    }
+
+    /// Number of points, those that are not finite left out.
+    ///
+    /// ```
+    /// # use surfsig::{CellIndex, PointCloud, Radius};
+    /// let index = CellIndex::new(&PointCloud::new(&[[f32::NAN; 3]]), Radius::new(1.0)?)?;
+    /// assert_eq!(index.len(), 0);
+    /// # Ok::<(), surfsig::Error>(())
+    /// ```
+    pub fn len(&self) -> usize {
+        self.point_of_rank.len()
+    }
+
+    /// Whether no point is finite.
+    ///
+    /// ```
+    /// # use surfsig::{CellIndex, PointCloud, Radius};
+    /// assert!(CellIndex::new(&PointCloud::new(&[]), Radius::new(1.0)?)?.is_empty());
+    /// # Ok::<(), surfsig::Error>(())
+    /// ```
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The row with this key, if it holds points.
+    pub(crate) fn row(&self, key: RowKey) -> Option<&Row> {
+        self.row_of_key.get(&key).map(|&row| &self.rows[row as usize])
+    }
+}

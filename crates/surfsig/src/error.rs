@@ -1,0 +1,67 @@
+//! What goes wrong by the caller's doing.
+
+/// A mistake that the caller can mend. Its text is one line and says what to do.
+///
+/// ```
+/// use surfsig::Error;
+/// assert!(matches!(Radius::new(0.0), Err(Error::InvalidRadius(_))));
+/// ```
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The radius is zero, negative, infinite or not a number.
+    #[error("radius must be a finite number above 0, not {0}")]
+    InvalidRadius(f64),
+    /// The lattice of a radius this small cannot be numbered at coordinates this large.
+    #[error(
+        "radius {radius} is too small for a coordinate of {coordinate}: float64 cannot tell its cells apart"
+    )]
+    RadiusBelowResolution {
+        /// The radius that was asked for.
+        radius: f64,
+        /// The coordinate that cannot be placed.
+        coordinate: f64,
+    },
+    /// An index names a point that the cloud does not have.
+    #[error("index {index} is outside a cloud of {len} points")]
+    IndexOutOfRange {
+        /// The index that was asked for.
+        index: usize,
+        /// The number of points.
+        len: usize,
+    },
+    /// More points than 32-bit ranks can number.
+    #[error("a cloud of {0} points is too large: at most 4294967295 are numbered; cut it into tiles")]
+    TooManyPoints(usize),
+    /// A frame's parameters have no meaning.
+    #[error("frame: {0}")]
+    InvalidFrame(String),
+    /// The check of section II.A: F F^T has an eigenvalue that is zero within rounding.
+    #[error(
+        "these atoms are no frame: {atoms} atoms leave F F^T with rank {rank} of {dimension} \
+         (smallest singular value {smallest:e}, largest {largest:e}); use more levels or wider ranges"
+    )]
+    NotAFrame {
+        /// Number of atoms that stayed inside the sphere.
+        atoms: usize,
+        /// Numerical rank of F.
+        rank: usize,
+        /// Number of rows of F.
+        dimension: usize,
+        /// Smallest singular value of F, patch units.
+        smallest: f64,
+        /// Largest singular value of F, patch units.
+        largest: f64,
+    },
+    /// The caller asked to stop.
+    #[error("stopped by the caller")]
+    Cancelled,
+    /// The operating system refused the worker threads.
+    #[error("cannot start {threads} threads: {reason}")]
+    Threads {
+        /// Number of threads that was asked for.
+        threads: usize,
+        /// The system's words.
+        reason: String,
+    },
+}

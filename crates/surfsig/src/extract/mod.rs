@@ -1,0 +1,253 @@
+//! From points to curvature: the only loop over points.
+
+mod extraction;
+mod monitor;
+mod queries;
+mod status;
+
+pub use extraction::Extraction;
+pub use monitor::Monitor;
+pub use queries::{Queries, voxel_representatives};
+pub use status::Status;
+
+use crate::ball::{DirectWalk, MomentSource};
+use crate::cell_index::{CellIndex, Row, RowKey};
+use crate::fit::FitAxes;
+use crate::fit::paraboloid::{Task, fit_paraboloids};
+use crate::fit::tensor::MomentBatch;
+use crate::moments::Moments;
+use crate::simd::InstructionSet;
+use crate::simd::lanes::{LANES, Lanes};
+use crate::{Error, PointCloud, Radius};
+use extraction::Columns;
+use rayon::prelude::*;
+
+/// Queries that one thread takes at a time, and after which it looks whether it should stop.
+const CHUNK: usize = 512;
+
+/// Most queries that share their windows.
+const RUN: usize = 32;
+
+/// How an extraction is done.
+///
+/// ```
+/// use surfsig::{ExtractOptions, FitAxes};
+/// let options = ExtractOptions { viewpoint: Some([0.0, 0.0, 2.0]), threads: Some(2), ..Default::default() };
+/// assert_eq!(options.axes, FitAxes::Surface);
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct ExtractOptions {
+    /// Axes in which the paraboloids are fitted.
+    pub axes: FitAxes,
+    /// Where the sensor stood, in the cloud's coordinates.
+    pub viewpoint: Option<[f64; 3]>,
+    /// Number of threads; all cores where it is `None`. The result is the same, bit for bit.
+    pub threads: Option<usize>,
+    /// Instructions to use; the best there are where it is `None`. The result is the same, bit for bit.
+    pub instruction_set: Option<InstructionSet>,
+}
+
+/// Curvature at every point of a cloud, from the points within a radius.
+///
+/// # Errors
+/// [`Error::RadiusBelowResolution`] where the radius is too small for the cloud's coordinates;
+/// [`Error::TooManyPoints`], [`Error::Threads`].
+///
+/// ```
+/// use surfsig::{extract, ExtractOptions, PointCloud, Radius, Status};
+/// let line: Vec<[f32; 3]> = (0..9).map(|i| [i as f32, 0.0, 0.0]).collect();
+/// let found = extract(&PointCloud::new(&line), Radius::new(20.0)?, &ExtractOptions::default())?;
+/// assert_eq!(found.status[4], Status::Degenerate as u8);
+/// assert!(found.k1[4].is_nan() && found.linearity[4] == 1.0);
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+pub fn extract(
+    cloud: &PointCloud<'_>,
+    radius: Radius,
+    options: &ExtractOptions,
+) -> Result<Extraction, Error> {
+    extract_monitored(cloud, radius, &Queries::All, options, &Monitor::default())
+}
+
+/// Curvature at chosen places, for a caller who watches.
+///
+/// # Errors
+/// As [`extract`]; [`Error::IndexOutOfRange`] for an index that the cloud does not have;
+/// [`Error::Cancelled`] where the monitor asked to stop.
+///
+/// ```
+/// use surfsig::{extract_monitored, ExtractOptions, Monitor, PointCloud, Queries, Radius};
+/// let points: Vec<[f32; 3]> = (0..100).map(|i| [(i % 10) as f32, (i / 10) as f32, 0.0]).collect();
+/// let places = [[4.5, 4.5, 0.1]];
+/// let queries = Queries::Positions(PointCloud::new_f64(&places));
+/// let monitor = Monitor::default();
+/// let found = extract_monitored(
+///     &PointCloud::new(&points), Radius::new(3.0)?, &queries, &ExtractOptions::default(), &monitor,
+/// )?;
+/// assert!(found.k1[0].abs() < 1e-6 && (found.normals[0][2] - 1.0).abs() < 1e-6);
+/// assert_eq!(monitor.done(), 1);
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+pub fn extract_monitored(
+    cloud: &PointCloud<'_>,
+    radius: Radius,
+    queries: &Queries<'_>,
+    options: &ExtractOptions,
+    monitor: &Monitor,
+) -> Result<Extraction, Error> {
+    let run = || run(cloud, radius, queries, options, monitor);
+    match options.threads {
+        None => run(),
+        Some(threads) => rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|e| Error::Threads { threads, reason: e.to_string() })?
+            .install(run),
+    }
+}
+
+fn run(
+    cloud: &PointCloud<'_>,
+    radius: Radius,
+    queries: &Queries<'_>,
+    options: &ExtractOptions,
+    monitor: &Monitor,
+) -> Result<Extraction, Error> {
+    queries.check(cloud)?;
+    let index = CellIndex::new(cloud, radius)?;
+    let elsewhere = queries.index(cloud, radius)?;
+    let asked = elsewhere.as_ref().unwrap_or(&index);
+    let columns = Columns::new(queries.len(cloud), radius.get(), options.axes);
+    let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
+    (0..asked.len().div_ceil(CHUNK)).into_par_iter().try_for_each_init(
+        || Worker::new(&index, asked, &columns, options, set),
+        |worker, chunk| {
+            if monitor.is_cancelled() {
+                return Err(Error::Cancelled);
+            }
+            let ranks = chunk * CHUNK..((chunk + 1) * CHUNK).min(asked.len());
+            let len = ranks.len();
+            worker.extract(ranks);
+            monitor.add(len);
+            Ok(())
+        },
+    )?;
+    if monitor.is_cancelled() {
+        return Err(Error::Cancelled);
+    }
+    Ok(columns.finish(options.axes, options.viewpoint.is_some()))
+}
+
+/// One thread's share of the loop: gathers moments until a batch is full, fits it, writes it.
+struct Worker<'a> {
+    walk: DirectWalk<'a>,
+    asked: &'a CellIndex,
+    columns: &'a Columns,
+    options: &'a ExtractOptions,
+    set: InstructionSet,
+    pending: Vec<Pending>,
+    moments: Vec<Moments<f64>>,
+}
+
+/// A query whose moments wait for their batch.
+#[derive(Clone, Copy)]
+struct Pending {
+    key: RowKey,
+    offset: [f32; 3],
+    entry: usize,
+}
+
+impl<'a> Worker<'a> {
+    fn new(
+        index: &'a CellIndex,
+        asked: &'a CellIndex,
+        columns: &'a Columns,
+        options: &'a ExtractOptions,
+        set: InstructionSet,
+    ) -> Self {
+        let walk = DirectWalk::new(index, set);
+        let (pending, moments) = (Vec::with_capacity(LANES), Vec::with_capacity(LANES));
+        Self { walk, asked, columns, options, set, pending, moments }
+    }
+
+    fn extract(&mut self, ranks: std::ops::Range<usize>) {
+        let rows = &self.asked.rows;
+        let mut rank = ranks.start;
+        let mut row = rows.partition_point(|row| row.end <= rank);
+        while rank < ranks.end {
+            let Row { key, end, .. } = rows[row];
+            self.walk.enter_row(key);
+            let end = end.min(ranks.end);
+            while rank < end {
+                rank = self.extract_run(key, rank, end);
+            }
+            row += 1;
+        }
+        self.fit_pending();
+    }
+
+    /// Takes the queries from `start` on that are close enough together to share their windows, and
+    /// returns where the next run begins.
+    fn extract_run(&mut self, key: RowKey, start: usize, end: usize) -> usize {
+        let CellIndex { x, y, z, lattice, point_of_rank, .. } = self.asked;
+        let last = x[start] + lattice.block_extent();
+        let length = x[start..end.min(start + RUN)].iter().take_while(|x| **x <= last).count();
+        let run = start..start + length;
+        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        for rank in run.clone() {
+            for (axis, value) in [x[rank], y[rank], z[rank]].into_iter().enumerate() {
+                low[axis] = low[axis].min(value);
+                high[axis] = high[axis].max(value);
+            }
+        }
+        self.walk.enter_run(low, high);
+        for rank in run.clone() {
+            let offset = [x[rank], y[rank], z[rank]];
+            self.pending.push(Pending { key, offset, entry: point_of_rank[rank] as usize });
+            self.moments.push(self.walk.moments::<f32>(offset));
+            if self.pending.len() == LANES && self.fit_pending() {
+                // The walk went back to points of the batch.
+                self.walk.enter_row(key);
+                self.walk.enter_run(low, high);
+            }
+        }
+        run.end
+    }
+
+    /// Fits and writes the pending queries; says whether the walk has moved for it.
+    fn fit_pending(&mut self) -> bool {
+        if self.pending.is_empty() {
+            return false;
+        }
+        let mut fits = self.fit();
+        let again: Vec<usize> = (0..self.pending.len()).filter(|&lane| fits.needs_f64.get(lane)).collect();
+        for &lane in &again {
+            let Pending { key, offset, .. } = self.pending[lane];
+            self.walk.enter_row(key);
+            self.walk.enter_run(offset, offset);
+            self.moments[lane] = self.walk.moments::<f64>(offset);
+        }
+        if !again.is_empty() {
+            fits = self.fit();
+        }
+        for (lane, (query, moments)) in self.pending.iter().zip(&self.moments).enumerate() {
+            self.columns.write(query.entry, moments.sums[0], &fits, lane);
+        }
+        self.pending.clear();
+        self.moments.clear();
+        !again.is_empty()
+    }
+
+    fn fit(&self) -> crate::fit::paraboloid::Paraboloids {
+        let batch = MomentBatch::new(&self.moments);
+        let to_sensor = self.options.viewpoint.map(|viewpoint| {
+            [0, 1, 2].map(|axis| {
+                Lanes(std::array::from_fn(|lane| {
+                    let Pending { key, offset, .. } = self.pending[lane.min(self.pending.len() - 1)];
+                    viewpoint[axis] - self.asked.lattice.middle(key)[axis] - f64::from(offset[axis])
+                }))
+            })
+        });
+        fit_paraboloids(self.set, &Task { moments: &batch, axes: self.options.axes, to_sensor })
+    }
+}

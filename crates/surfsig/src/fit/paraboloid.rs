@@ -1,0 +1,265 @@
+//! The least-squares paraboloid of eq. (5), read off the moments, for eight points at once.
+//!
+//! In the sensor's axes it is the paper's fit, linear in its six unknowns. In the surface's own axes
+//! the height runs along the fitted normal: the axes are turned until the slope at the patch's
+//! centre is zero, and each turn costs a contraction of the moments and no look at the points.
+
+use super::covariance::{Spread, spread};
+use super::tensor::{
+    Axes, MomentBatch, PatchMoments, Vector, add_scaled, chosen, cross, dot, inverted, normalised,
+};
+use crate::curvature::{Principal, principal_curvatures};
+use crate::simd::for_each_instruction_set;
+use crate::simd::lanes::{Lanes, Mask};
+
+/// In which axes the paraboloid's height is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum FitAxes {
+    /// The surface's own: results turn with the object, and do not depend on where the sensor stood.
+    #[default]
+    Surface,
+    /// The cloud's, as the paper fits: z runs away from the sensor.
+    Sensor,
+}
+
+/// Unknowns of eq. (5), hence the least number of points.
+pub(crate) const UNKNOWNS: usize = 6;
+
+/// A slope at the patch's centre that counts as none.
+const FLAT: f64 = 1e-6;
+
+/// Turns of the axes after which a patch has `not_converged`.
+const MAX_TURNS: usize = 25;
+
+/// Points whose second spread is below this share of the first lie on a line (variances).
+const LINE: f64 = 1e-7;
+
+/// A pivot of the normal equations, relative to its diagonal, that rounding alone can make.
+const SINGULAR: f64 = 1e-10;
+
+/// Sums in f32 are trusted where the residual is above this share of the radius, ...
+const ROUGH_ENOUGH: f64 = 2e-3;
+
+/// ... where the points are this far from a line (variances), ...
+const WIDE_ENOUGH: f64 = 2.5e-3;
+
+/// ... and where the normal equations are this far from singular.
+const REGULAR_ENOUGH: f64 = 1e-4;
+
+/// What is fitted, and what is known about the sensor.
+pub(crate) struct Task<'a> {
+    pub moments: &'a MomentBatch,
+    pub axes: FitAxes,
+    /// From each point towards the sensor; `None` where nobody knows.
+    pub to_sensor: Option<Vector>,
+}
+
+/// The fits of a batch, lengths in units of the radius.
+pub(crate) struct Paraboloids {
+    pub principal: Principal,
+    pub spread: [Lanes; 3],
+    /// a, b, c, d, e, f of eq. (5).
+    pub coefficients: [Lanes; 6],
+    pub residual: Lanes,
+    pub condition: Lanes,
+    /// Fewer than three points, or all of them on a line: not even a normal.
+    pub no_plane: Mask,
+    pub too_few: Mask,
+    pub singular: Mask,
+    pub converged: Mask,
+    /// Sums in f32 do not carry this fit: take them again in f64.
+    pub needs_f64: Mask,
+}
+
+for_each_instruction_set! {
+    /// Fits a batch.
+    #[inline]
+    pub(crate) fn fit_paraboloids(task: &Task<'_>) -> Paraboloids {
+        plain: fit,
+        wide: fit,
+        widest: fit,
+    }
+}
+
+#[inline(always)]
+fn fit(task: &Task<'_>) -> Paraboloids {
+    let count = task.moments.count;
+    let Spread { eigenvalues, longest, normal } = spread(task.moments.covariance());
+    let too_few = count.lt(Lanes::splat(UNKNOWNS as f64));
+    let line = eigenvalues[1].le(eigenvalues[0] * Lanes::splat(LINE));
+    let no_plane = line | count.lt(Lanes::splat(3.0));
+
+    let (axes, solution, converged, away_from_sensor) = match task.axes {
+        FitAxes::Sensor => {
+            let axes = Axes::of_cloud();
+            let solution = solve(&task.moments.along(&axes));
+            // The paper's z runs away from the sensor, unless a viewpoint says otherwise.
+            let upward = solution.normal(&axes);
+            let away = match task.to_sensor {
+                Some(to_sensor) => dot(&upward, &to_sensor).lt(Lanes::ZERO),
+                None => Mask::ALL,
+            };
+            (axes, solution, Mask::ALL, away)
+        }
+        FitAxes::Surface => {
+            let towards = match task.to_sensor {
+                Some(to_sensor) => to_sensor,
+                // No sensor: up, so that the answer is at least always the same.
+                None => upwards(&normal),
+            };
+            let backwards = dot(&normal, &towards).lt(Lanes::ZERO);
+            let w = inverted(&normal, backwards);
+            let start = Axes { u: longest, v: cross(&w, &longest), w };
+            let (axes, solution, converged) = turn_until_flat(task.moments, start, !(no_plane | too_few));
+            (axes, solution, converged, !Mask::ALL)
+        }
+    };
+
+    let normal_of_fit = solution.normal(&axes);
+    let singular = solution.smallest_pivot.lt(Lanes::splat(SINGULAR));
+    let unfitted = too_few | singular;
+    let mut principal = principal_curvatures(&solution.coefficients, &axes, away_from_sensor);
+    // Where no paraboloid is determined, the plane still is.
+    let plane_normal = match task.axes {
+        FitAxes::Surface => axes.w,
+        FitAxes::Sensor => inverted(&normal, dot(&normal, &normal_of_fit).lt(Lanes::ZERO)),
+    };
+    principal.normal = chosen(unfitted, &plane_normal, &principal.normal);
+    let rough = Lanes::splat(ROUGH_ENOUGH * ROUGH_ENOUGH).le(solution.residual_square);
+    let wide = (eigenvalues[0] * Lanes::splat(WIDE_ENOUGH)).le(eigenvalues[1]);
+    let regular = Lanes::splat(REGULAR_ENOUGH).le(solution.smallest_pivot);
+    Paraboloids {
+        principal,
+        spread: eigenvalues,
+        coefficients: solution.coefficients,
+        residual: solution.residual_square.max(Lanes::ZERO).sqrt(),
+        condition: Lanes::ONE / solution.smallest_pivot.sqrt(),
+        no_plane,
+        too_few,
+        singular,
+        converged,
+        needs_f64: !(too_few | rough & wide & regular),
+    }
+}
+
+/// The first of z, y, x along which the normal has a part at all.
+#[inline(always)]
+fn upwards(normal: &Vector) -> Vector {
+    let (one, zero) = (Lanes::ONE, Lanes::ZERO);
+    let tiny = Lanes::splat(1e-12);
+    let z = tiny.lt(normal[2].abs());
+    let y = tiny.lt(normal[1].abs());
+    [z.select(zero, y.select(zero, one)), z.select(zero, y.select(one, zero)), z.select(one, zero)]
+}
+
+/// Turns the axes until the fitted slope at the centre is zero.
+///
+/// Where the patch is large against the radius of curvature, full turns overshoot and diverge: the
+/// length of each turn is therefore the secant's, from the slopes before and after the last turn.
+#[inline(always)]
+fn turn_until_flat(moments: &MomentBatch, start: Axes, fittable: Mask) -> (Axes, Solution, Mask) {
+    let flat = Lanes::splat(FLAT * FLAT);
+    let mut axes = start;
+    let mut solution = solve(&moments.along(&axes));
+    let mut damping = Lanes::ONE;
+    let mut active = fittable & flat.lt(solution.slope_square());
+    for _ in 0..MAX_TURNS {
+        if !active.any() {
+            break;
+        }
+        let [_, _, c, d, _, _] = solution.coefficients;
+        let w = add_scaled(&add_scaled(&axes.w, -damping * c, &axes.u), -damping * d, &axes.v);
+        let turned = axes.tilted_to(&w);
+        // A lane that has converged keeps its axes, and so finds the same solution again.
+        axes = Axes {
+            u: chosen(active, &turned.u, &axes.u),
+            v: chosen(active, &turned.v, &axes.v),
+            w: chosen(active, &turned.w, &axes.w),
+        };
+        solution = solve(&moments.along(&axes));
+        let [_, _, c_new, d_new, _, _] = solution.coefficients;
+        let (gain_c, gain_d) = (c - c_new, d - d_new);
+        let secant = damping * gain_c.mul_add(c, gain_d * d) / gain_c.mul_add(gain_c, gain_d * gain_d);
+        damping = active.select(secant.max(Lanes::splat(0.2)).min(Lanes::splat(1.5)), damping);
+        active = active & flat.lt(solution.slope_square());
+    }
+    let converged = solution.slope_square().le(flat);
+    (axes, solution, converged)
+}
+
+/// The solution of one set of normal equations.
+struct Solution {
+    /// a, b, c, d, e, f of eq. (5).
+    coefficients: [Lanes; 6],
+    /// Mean square of the heights' residuals.
+    residual_square: Lanes,
+    /// Smallest pivot of the normal equations, each relative to its diagonal element.
+    smallest_pivot: Lanes,
+}
+
+impl Solution {
+    #[inline(always)]
+    fn slope_square(&self) -> Lanes {
+        let [_, _, c, d, _, _] = self.coefficients;
+        c.mul_add(c, d * d)
+    }
+
+    /// The normal at the centre, on the side of w.
+    #[inline(always)]
+    fn normal(&self, axes: &Axes) -> Vector {
+        let [_, _, c, d, _, _] = self.coefficients;
+        normalised(&add_scaled(&add_scaled(&axes.w, -c, &axes.u), -d, &axes.v))
+    }
+}
+
+/// Normal equations of eq. (5) by L D L^T; the unknowns in the order f, c, d, a, e, b of 1, u, v, uu, uv, vv.
+#[inline(always)]
+fn solve(m: &PatchMoments) -> Solution {
+    // Which moment stands in row i, column j <= i: the product of monomials i and j.
+    const PRODUCT: [[usize; UNKNOWNS]; UNKNOWNS] = [
+        [0, 0, 0, 0, 0, 0],
+        [1, 3, 0, 0, 0, 0],
+        [2, 4, 5, 0, 0, 0],
+        [3, 6, 7, 10, 0, 0],
+        [4, 7, 8, 11, 12, 0],
+        [5, 8, 9, 12, 13, 14],
+    ];
+    let mut lower = [[Lanes::ZERO; UNKNOWNS]; UNKNOWNS];
+    let mut scaled = [[Lanes::ZERO; UNKNOWNS]; UNKNOWNS];
+    let mut inverse_pivot = [Lanes::ZERO; UNKNOWNS];
+    let mut forward = m.height;
+    let mut residual_square = m.height_square;
+    let mut smallest_pivot = Lanes::ONE;
+    for i in 0..UNKNOWNS {
+        for j in 0..=i {
+            let mut value = m.plane[PRODUCT[i][j]];
+            for k in 0..j {
+                value = (-scaled[i][k]).mul_add(lower[j][k], value);
+            }
+            if j < i {
+                // scaled = L D, lower = L.
+                scaled[i][j] = value;
+                lower[i][j] = value * inverse_pivot[j];
+            } else {
+                // The tiny number makes 0 / 0, where all points are equal, a pivot of 0.
+                let relative = value / (m.plane[PRODUCT[i][i]] + Lanes::splat(1e-300));
+                smallest_pivot = relative.min(smallest_pivot);
+                inverse_pivot[i] = Lanes::ONE / value;
+            }
+        }
+        for k in 0..i {
+            forward[i] = (-lower[i][k]).mul_add(forward[k], forward[i]);
+        }
+        residual_square = (-forward[i]).mul_add(forward[i] * inverse_pivot[i], residual_square);
+    }
+    let mut unknowns = [Lanes::ZERO; UNKNOWNS];
+    for i in (0..UNKNOWNS).rev() {
+        let mut value = forward[i] * inverse_pivot[i];
+        for k in i + 1..UNKNOWNS {
+            value = (-lower[k][i]).mul_add(unknowns[k], value);
+        }
+        unknowns[i] = value;
+    }
+    let [f, c, d, a, e, b] = unknowns;
+    Solution { coefficients: [a, b, c, d, e, f], residual_square, smallest_pivot }
+}

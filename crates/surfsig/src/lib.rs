@@ -1,0 +1,54 @@
+//! surfsig tells what a scanned surface is: curvature and surface signatures of point clouds.
+//!
+//! Around each point a paraboloid is fitted, its principal curvatures are read off, and, where
+//! wanted, the fields of its Gaussian and mean curvature are expressed in a frame. Equal surfaces get
+//! equal signatures.
+//!
+//! ```
+//! use surfsig::{extract, ExtractOptions, Frame, PointCloud, Radius, similarity, Status};
+//!
+//! // Two bumps, each a cap of a sphere of radius 0.1, on different sides of the sensor.
+//! let cap = |x0: f32, i: usize| {
+//!     let (x, y) = ((i % 40) as f32 * 0.001 - 0.02, (i / 40) as f32 * 0.001 - 0.02);
+//!     [x0 + x, y, (0.01 - x * x - y * y).sqrt()]
+//! };
+//! let points: Vec<[f32; 3]> = [0.0, 1.0].iter().flat_map(|x0| (0..1600).map(move |i| cap(*x0, i))).collect();
+//!
+//! let radius = Radius::new(0.01)?;
+//! let found = extract(&PointCloud::new(&points), radius, &ExtractOptions::default())?;
+//! let [a, b] = [20 * 40 + 20, 1600 + 20 * 40 + 20];
+//! assert_eq!(found.status[a], Status::Ok as u8);
+//! assert!((found.k1[a] - 10.0).abs() < 0.1 && (found.k2[b] - 10.0).abs() < 0.1);
+//!
+//! let [wa, wb] = [a, b].map(|i| Frame::shared().signature(&found.paraboloid(i)).unwrap());
+//! assert!(similarity(&wa, &wb) > 0.999);
+//! # Ok::<(), surfsig::Error>(())
+//! ```
+//!
+//! The way of the data, room by room: [`PointCloud`] -> [`CellIndex`] -> [`Moments`] -> paraboloid
+//! ([`FitAxes`]) -> curvature ([`Paraboloid`]) -> [`Frame`] -> [`similarity`]; [`extract()`] walks it.
+
+mod ball;
+mod cell_index;
+mod curvature;
+mod error;
+mod extract;
+mod fit;
+mod frame;
+mod moments;
+mod point_cloud;
+mod simd;
+mod similarity;
+
+pub use cell_index::CellIndex;
+pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
+pub use error::Error;
+pub use extract::{
+    ExtractOptions, Extraction, Monitor, Queries, Status, extract, extract_monitored, voxel_representatives,
+};
+pub use fit::FitAxes;
+pub use frame::{Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};
+pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
+pub use point_cloud::{Offsets, PointCloud, Radius};
+pub use simd::InstructionSet;
+pub use similarity::{GOOD, OPTIMAL, SimilarityClass, similarity};

@@ -1,0 +1,231 @@
+//! The 34 sums beyond the count, over a block of points in structure-of-arrays order.
+
+use super::for_each_instruction_set;
+use super::select::{BLOCK, Block};
+use crate::moments::{MOMENTS, Scalar, slot};
+
+/// Lanes that the points are dealt to, one after the other, on every instruction set.
+const VIRTUAL_LANES: usize = 16;
+
+for_each_instruction_set! {
+    /// The sums over the first `len` points of the block. The slots beyond `len`, up to a multiple
+    /// of 16, must be zero: they then add nothing.
+    #[inline]
+    pub(crate) fn accumulate<S: Scalar>(block: &Block, len: usize) -> [S; MOMENTS] {
+        plain: accumulate_in::<S, 4>,
+        wide: accumulate_in::<S, 8>,
+        widest: accumulate_in::<S, 16>,
+    }
+}
+
+/// Each pass keeps only as many sums as there are registers.
+#[inline(always)]
+fn accumulate_in<S: Scalar, const WIDTH: usize>(block: &Block, len: usize) -> [S; MOMENTS] {
+    assert!(len <= BLOCK);
+    let mut sums = [S::default(); MOMENTS];
+    sums[0] = S::from_f64(len as f64);
+    pass::<S, WIDTH, 9>(block, len, &mut sums, &PLANE, |x, y, _| {
+        let (xx, xy, yy) = (mul(x, x), mul(x, y), mul(y, y));
+        [
+            (x, None),
+            (y, None),
+            (x, Some(x)),
+            (x, Some(y)),
+            (y, Some(y)),
+            (xx, Some(x)),
+            (xx, Some(y)),
+            (x, Some(yy)),
+            (xy, Some(xy)),
+        ]
+    });
+    pass::<S, WIDTH, 9>(block, len, &mut sums, &HEIGHT, |x, y, z| {
+        let (xx, xy, yy) = (mul(x, x), mul(x, y), mul(y, y));
+        [
+            (yy, Some(y)),
+            (xx, Some(xx)),
+            (xx, Some(xy)),
+            (xy, Some(yy)),
+            (yy, Some(yy)),
+            (z, None),
+            (xx, Some(z)),
+            (xy, Some(z)),
+            (yy, Some(z)),
+        ]
+    });
+    pass::<S, WIDTH, 8>(block, len, &mut sums, &HEIGHT_CUBIC, |x, y, z| {
+        let (xx, yy, xz, yz) = (mul(x, x), mul(y, y), mul(x, z), mul(y, z));
+        [
+            (x, Some(z)),
+            (y, Some(z)),
+            (xx, Some(xz)),
+            (xx, Some(yz)),
+            (yy, Some(xz)),
+            (yy, Some(yz)),
+            (z, Some(z)),
+            (xz, Some(xz)),
+        ]
+    });
+    pass::<S, WIDTH, 8>(block, len, &mut sums, &HEIGHT_SQUARE, |x, y, z| {
+        let (zz, xz, yz) = (mul(z, z), mul(x, z), mul(y, z));
+        [
+            (x, Some(zz)),
+            (y, Some(zz)),
+            (xz, Some(yz)),
+            (yz, Some(yz)),
+            (zz, Some(z)),
+            (xz, Some(zz)),
+            (yz, Some(zz)),
+            (zz, Some(zz)),
+        ]
+    });
+    sums
+}
+
+/// Slots of the sums that each pass takes, in the order in which its terms stand above.
+const PLANE: [usize; 9] = [
+    slot(1, 0, 0),
+    slot(0, 1, 0),
+    slot(2, 0, 0),
+    slot(1, 1, 0),
+    slot(0, 2, 0),
+    slot(3, 0, 0),
+    slot(2, 1, 0),
+    slot(1, 2, 0),
+    slot(2, 2, 0),
+];
+const HEIGHT: [usize; 9] = [
+    slot(0, 3, 0),
+    slot(4, 0, 0),
+    slot(3, 1, 0),
+    slot(1, 3, 0),
+    slot(0, 4, 0),
+    slot(0, 0, 1),
+    slot(2, 0, 1),
+    slot(1, 1, 1),
+    slot(0, 2, 1),
+];
+const HEIGHT_CUBIC: [usize; 8] = [
+    slot(1, 0, 1),
+    slot(0, 1, 1),
+    slot(3, 0, 1),
+    slot(2, 1, 1),
+    slot(1, 2, 1),
+    slot(0, 3, 1),
+    slot(0, 0, 2),
+    slot(2, 0, 2),
+];
+const HEIGHT_SQUARE: [usize; 8] = [
+    slot(1, 0, 2),
+    slot(0, 1, 2),
+    slot(1, 1, 2),
+    slot(0, 2, 2),
+    slot(0, 0, 3),
+    slot(1, 0, 3),
+    slot(0, 1, 3),
+    slot(0, 0, 4),
+];
+
+/// One pass over the block: `terms` gives, for `WIDTH` points, the products to add.
+///
+/// `WIDTH` hardware lanes take their share of the virtual ones in turn, which keeps the sums in
+/// registers.
+#[inline(always)]
+fn pass<S: Scalar, const WIDTH: usize, const TERMS: usize>(
+    block: &Block,
+    len: usize,
+    sums: &mut [S; MOMENTS],
+    slots: &[usize; TERMS],
+    terms: impl Fn([S; WIDTH], [S; WIDTH], [S; WIDTH]) -> [([S; WIDTH], Option<[S; WIDTH]>); TERMS],
+) {
+    let mut lanes = [[S::default(); VIRTUAL_LANES]; TERMS];
+    for part in 0..VIRTUAL_LANES / WIDTH {
+        let first = part * WIDTH;
+        let mut totals = [[S::default(); WIDTH]; TERMS];
+        for step in 0..len.div_ceil(VIRTUAL_LANES) {
+            let at = step * VIRTUAL_LANES + first;
+            let (x, y, z) = (load(&block.x, at), load(&block.y, at), load(&block.z, at));
+            let products = terms(x, y, z);
+            for (total, (a, b)) in totals.iter_mut().zip(products) {
+                for l in 0..WIDTH {
+                    total[l] = match b {
+                        Some(b) => a[l].mul_add(b[l], total[l]),
+                        None => a[l] + total[l],
+                    };
+                }
+            }
+        }
+        for (lanes, total) in lanes.iter_mut().zip(&totals) {
+            lanes[first..first + WIDTH].copy_from_slice(total);
+        }
+    }
+    for (lanes, &slot) in lanes.iter().zip(slots) {
+        sums[slot] = reduce(lanes);
+    }
+}
+
+#[inline(always)]
+fn load<S: Scalar, const WIDTH: usize>(row: &[f32], at: usize) -> [S; WIDTH] {
+    let row: &[f32; WIDTH] = row[at..at + WIDTH].try_into().expect("a slice of that length");
+    let mut lanes = [S::default(); WIDTH];
+    for l in 0..WIDTH {
+        lanes[l] = S::from_f32(row[l]);
+    }
+    lanes
+}
+
+#[inline(always)]
+fn mul<S: Scalar, const WIDTH: usize>(a: [S; WIDTH], b: [S; WIDTH]) -> [S; WIDTH] {
+    let mut product = [S::default(); WIDTH];
+    for l in 0..WIDTH {
+        product[l] = a[l] * b[l];
+    }
+    product
+}
+
+/// Sums the lanes in a fixed order: the same tree on every instruction set.
+#[inline(always)]
+fn reduce<S: Scalar>(lanes: &[S; VIRTUAL_LANES]) -> S {
+    let mut sums = *lanes;
+    for half in [8, 4, 2, 1] {
+        for l in 0..half {
+            sums[l] = sums[l] + sums[l + half];
+        }
+    }
+    sums[0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{InstructionSet, select::BLOCK};
+    use super::*;
+    use crate::moments::Moments;
+
+    fn block_of(len: usize) -> (Block, Vec<[f64; 3]>) {
+        let mut block = Block::new();
+        let mut points = Vec::new();
+        for i in 0..len {
+            let t = i as f32;
+            (block.x[i], block.y[i], block.z[i]) = ((0.7 * t).sin(), (1.3 * t).cos(), (0.31 * t + 1.0).sin());
+            points.push([block.x[i].into(), block.y[i].into(), block.z[i].into()]);
+        }
+        (block, points)
+    }
+
+    #[test]
+    fn every_slot_is_the_sum_that_it_names_and_every_set_gives_the_same_bits() {
+        for len in [1, 15, 16, 17, 240, BLOCK] {
+            let (block, points) = block_of(len);
+            let reference = Moments::<f64>::of_points(&points);
+            let plain32 = accumulate::<f32>(InstructionSet::available()[0], &block, len);
+            let plain64 = accumulate::<f64>(InstructionSet::available()[0], &block, len);
+            for set in InstructionSet::available() {
+                assert_eq!(accumulate::<f32>(set, &block, len), plain32, "{}", set.name());
+                assert_eq!(accumulate::<f64>(set, &block, len), plain64, "{}", set.name());
+            }
+            for (k, expected) in reference.sums.into_iter().enumerate() {
+                assert!((f64::from(plain32[k]) - expected).abs() < 1e-6 * len as f64, "{len} {k}");
+                assert!((plain64[k] - expected).abs() < 1e-14 * len as f64, "{len} {k}");
+            }
+        }
+    }
+}

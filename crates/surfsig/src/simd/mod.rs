@@ -1,0 +1,10 @@
+//! The only rooms with `unsafe`: the two kernels that touch every point of every ball, and the lanes
+//! in which many fits are solved at once.
+
+pub(crate) mod accumulate;
+pub(crate) mod instruction_set;
+pub(crate) mod lanes;
+pub(crate) mod select;
+
+pub use instruction_set::InstructionSet;
+pub(crate) use instruction_set::for_each_instruction_set;
