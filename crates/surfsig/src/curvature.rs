@@ -45,6 +45,27 @@ pub struct Paraboloid {
 }
 
 impl Paraboloid {
+    /// The surface in its own axes, x along k1, in patch units for a patch of the given side.
+    ///
+    /// ```
+    /// let p = surfsig::Paraboloid::of_principal_curvatures(25.0, -50.0, 0.040);
+    /// assert_eq!((p.a, p.b, p.e), (0.5, -1.0, 0.0));
+    /// ```
+    pub fn of_principal_curvatures(k1: f32, k2: f32, side: f64) -> Self {
+        Self { a: 0.5 * f64::from(k1) * side, b: 0.5 * f64::from(k2) * side, ..Self::default() }
+    }
+
+    /// The surface a, b, c, d, e, f in patch units for a patch of the given side.
+    ///
+    /// ```
+    /// let p = surfsig::Paraboloid::of_coefficients([100.0, 0.0, 0.5, 0.0, 25.0, 0.02], 0.040);
+    /// assert_eq!((p.a, p.c, p.e), (4.0, 0.5, 1.0));
+    /// ```
+    pub fn of_coefficients(coefficients: [f32; 6], side: f64) -> Self {
+        let [a, b, c, d, e, f] = coefficients.map(f64::from);
+        Self { a: a * side, b: b * side, c, d, e: e * side, f: f / side }
+    }
+
     /// The height over (x, y): eq. (5).
     ///
     /// ```

@@ -3,7 +3,7 @@
 /// A mistake that the caller can mend. Its text is one line and says what to do.
 ///
 /// ```
-/// use surfsig::Error;
+/// use surfsig::{Error, Radius};
 /// assert!(matches!(Radius::new(0.0), Err(Error::InvalidRadius(_))));
 /// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -57,7 +57,9 @@ pub struct Extraction {
     pub planarity: Vec<f32>,
     /// l3 / l1: 1 in a volume.
     pub scattering: Vec<f32>,
-    /// a, b, c, d, e, f of eq. (5) about each query in the cloud's axes; empty in the surface's axes.
+    /// a, b, c, d, e, f of eq. (5) about each query, along the cloud's x and y, with heights that grow
+    /// away from the sensor as in the paper: along z, or against it where a viewpoint is above the
+    /// surface. Empty in the surface's axes.
     pub coefficients: Vec<[f32; 6]>,
 }
 
@@ -87,30 +89,9 @@ impl Extraction {
     pub fn paraboloid(&self, index: usize) -> Paraboloid {
         let side = 2.0 * self.radius;
         match self.axes {
-            // The height that grows away from the sensor, so that a bump has positive curvature.
-            FitAxes::Surface => Paraboloid {
-                a: 0.5 * f64::from(self.k1[index]) * side,
-                b: 0.5 * f64::from(self.k2[index]) * side,
-                ..Paraboloid::default()
-            },
-            FitAxes::Sensor => {
-                let [a, b, c, d, e, f] = self.coefficients[index].map(f64::from);
-                // A sensor on the far side sees the surface mirrored along z.
-                let sign = if self.sensor_is_above(index) { -1.0 } else { 1.0 };
-                Paraboloid {
-                    a: sign * a * side,
-                    b: sign * b * side,
-                    c: sign * c,
-                    d: sign * d,
-                    e: sign * e * side,
-                    f: sign * f / side,
-                }
-            }
+            FitAxes::Surface => Paraboloid::of_principal_curvatures(self.k1[index], self.k2[index], side),
+            FitAxes::Sensor => Paraboloid::of_coefficients(self.coefficients[index], side),
         }
-    }
-
-    fn sensor_is_above(&self, index: usize) -> bool {
-        self.normals[index][2] > 0.0
     }
 }
 
@@ -201,7 +182,9 @@ impl Columns {
             store(&self.directions[entry][axis], fits.principal.direction[axis].0[lane]);
         }
         if let Some(cells) = self.coefficients.get(entry) {
-            let units = [1.0 / r, 1.0 / r, 1.0, 1.0, 1.0 / r, r];
+            // Heights grow away from the sensor, and the normal points to it.
+            let sign = if fits.principal.normal[2].0[lane] > 0.0 { -1.0 } else { 1.0 };
+            let units = [1.0 / r, 1.0 / r, 1.0, 1.0, 1.0 / r, r].map(|unit| sign * unit);
             for (cell, (coefficient, unit)) in cells.iter().zip(fits.coefficients.iter().zip(units)) {
                 store(cell, coefficient.0[lane] * unit);
             }

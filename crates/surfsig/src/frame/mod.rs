@@ -9,6 +9,7 @@ pub use parameters::{FrameParameters, Levels};
 use crate::curvature::{ALPHA, Paraboloid};
 use crate::{Error, Status};
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 use std::sync::OnceLock;
 use symmetry::Part;
 use table::Table;
@@ -228,17 +229,43 @@ impl Frame {
         rows: &mut [[f32; SIGNATURE]],
         statuses: &mut [Status],
     ) {
-        assert!(curvatures.len() == rows.len() && rows.len() == statuses.len());
         let table = self.table.get_or_init(|| Table::new(self));
-        for ((curvature, row), status) in curvatures.iter().zip(rows).zip(statuses) {
-            let [k1, k2] = curvature.map(|k| f64::from(k) * side);
-            if !table.interpolate(k1, k2, row) {
-                *row = self.signature(&in_own_axes(k1, k2)).unwrap_or([f32::NAN; SIGNATURE]);
+        fill(curvatures, rows, statuses, |&[k1, k2], row| {
+            let surface = Paraboloid::of_principal_curvatures(k1, k2, side);
+            // 2 a and 2 b are the curvatures in patch units.
+            if !table.interpolate(2.0 * surface.a, 2.0 * surface.b, row) {
+                *row = self.signature(&surface).unwrap_or([f32::NAN; SIGNATURE]);
             }
-            if row[0].is_nan() && !k1.is_nan() {
-                *status = Status::OutsideVocabulary;
-            }
-        }
+            k1.is_finite()
+        });
+    }
+
+    /// Signatures of surfaces given as a, b, c, d, e, f of eq. (5), for patches of the given side: the
+    /// paper's way, in the sensor's axes. Rows and statuses as in [`Self::signatures_of_curvatures`].
+    ///
+    /// # Panics
+    /// If `surfaces`, `rows` and `statuses` differ in length.
+    ///
+    /// ```
+    /// use surfsig::{Frame, Paraboloid, SIGNATURE, Status};
+    /// let tilted = [10.0, 5.0, 0.3, 0.0, 0.0, 0.0];
+    /// let mut row = [[0.0; SIGNATURE]];
+    /// Frame::shared().signatures_of_surfaces(0.040, &[tilted], &mut row, &mut [Status::Ok]);
+    /// let expected = Frame::shared().signature(&Paraboloid::of_coefficients(tilted, 0.040)).unwrap();
+    /// assert_eq!(row[0], expected);
+    /// ```
+    pub fn signatures_of_surfaces(
+        &self,
+        side: f64,
+        surfaces: &[[f32; 6]],
+        rows: &mut [[f32; SIGNATURE]],
+        statuses: &mut [Status],
+    ) {
+        fill(surfaces, rows, statuses, |&surface, row| {
+            let signature = self.signature(&Paraboloid::of_coefficients(surface, side));
+            *row = signature.unwrap_or([f32::NAN; SIGNATURE]);
+            surface[0].is_finite()
+        });
     }
 
     fn inverse_root_of(&self, part: Part) -> &DMatrix<f64> {
@@ -256,9 +283,21 @@ impl Frame {
     }
 }
 
-/// The paraboloid with these principal curvatures, x along k1.
-fn in_own_axes(k1: f64, k2: f64) -> Paraboloid {
-    Paraboloid { a: 0.5 * k1, b: 0.5 * k2, ..Paraboloid::default() }
+/// Rows for surfaces, on all cores. `make_row` says whether there was a surface at all; a row of NaN
+/// is then one beyond the vocabulary.
+fn fill<T: Sync>(
+    surfaces: &[T],
+    rows: &mut [[f32; SIGNATURE]],
+    statuses: &mut [Status],
+    make_row: impl Fn(&T, &mut [f32; SIGNATURE]) -> bool + Sync,
+) {
+    assert!(surfaces.len() == rows.len() && rows.len() == statuses.len());
+    let work = surfaces.par_iter().zip(rows).zip(statuses).with_min_len(256);
+    work.for_each(|((surface, row), status)| {
+        if make_row(surface, row) && row[0].is_nan() {
+            *status = Status::OutsideVocabulary;
+        }
+    });
 }
 
 /// Singular values, and left singular vectors as columns, of one part of F.

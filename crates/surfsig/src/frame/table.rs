@@ -4,8 +4,8 @@
 //! free. The table holds those at each node, and a row is made by cubic interpolation.
 
 use super::symmetry::{EVEN, Part};
-use super::{Frame, SIGNATURE, VOCABULARY_END, in_own_axes};
-use crate::curvature::{GRID, grid_coordinate};
+use super::{Frame, SIGNATURE, VOCABULARY_END};
+use crate::curvature::{GRID, Paraboloid, grid_coordinate};
 use crate::simd::{InstructionSet, for_each_instruction_set};
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -74,7 +74,7 @@ impl Table {
 /// The free numbers of w. Only the two parts that are even along both axes take part, and a basis
 /// vector of theirs is spread evenly over a number's copies.
 fn free_signature(frame: &Frame, k1: f64, k2: f64) -> [f64; FREE] {
-    let surface = in_own_axes(k1, k2);
+    let surface = Paraboloid { a: 0.5 * k1, b: 0.5 * k2, ..Paraboloid::default() };
     let half = EVEN * EVEN;
     let mut free = [0.0; FREE];
     for (mean, values) in [false, true].into_iter().zip(free.chunks_exact_mut(half)) {
@@ -160,9 +160,8 @@ mod tests {
             let frame = Frame::shared();
             let mut row = [[0.0; SIGNATURE]];
             frame.signatures_of_curvatures(1.0, &[[k1 as f32, k2 as f32]], &mut row, &mut [crate::Status::Ok]);
-            let exact = frame.times_inverse_root(
-                &in_own_axes(f64::from(k1 as f32), f64::from(k2 as f32)).curvature_fields(frame.parameters.formula),
-            );
+            let surface = Paraboloid::of_principal_curvatures(k1 as f32, k2 as f32, 1.0);
+            let exact = frame.times_inverse_root(&surface.curvature_fields(frame.parameters.formula));
             let length = exact.iter().map(|v| v * v).sum::<f64>().sqrt();
             prop_assume!((length - VOCABULARY_END).abs() > 1e-4);
             if length > VOCABULARY_END {

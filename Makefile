@@ -1,0 +1,60 @@
+# The way in: `make demo` shows the method at work, `make test` proves it. Both set up all they need in .venv.
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+OUT    ?= demo
+
+# What the compiled module is made from; a change of any rebuilds it.
+SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
+
+.PHONY: help demo test lint format bench docs clean build
+.DEFAULT_GOAL := help
+
+help: ## Say what there is to make
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+demo: build ## Run the main job and draw it into demo/
+	$(BIN)/python examples/demo.py $(OUT)
+
+test: build ## Run all tests: Rust, its doc examples, Python
+	cargo test --workspace --quiet
+	$(BIN)/python -m pytest
+
+lint: build ## Formatters, linters and type checkers
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --quiet -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest surfsig._surfsig
+
+format: $(VENV)/.tools ## Format all code
+	cargo fmt --all
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: build ## Time surfsig and its peers in one run, and write BENCHMARKS.md
+	$(BIN)/python benchmarks/run.py --write
+
+docs: build ## Build the API reference: target/doc (Rust) and build/docs (Python)
+	cargo doc --workspace --no-deps
+	$(BIN)/python -m pdoc --docformat numpy --output-directory build/docs surfsig
+
+clean: ## Remove everything that was built
+	rm -rf $(VENV) target build dist $(OUT)
+
+build: $(VENV)/.built
+
+# A virtual environment of the project's own: no sudo, and nothing of the system's Python is touched.
+$(VENV)/.tools: pyproject.toml
+	@command -v cargo >/dev/null || { echo "cargo is missing: install Rust from https://rustup.rs, then run make again" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
+	$(BIN)/python -m pip install --quiet --group dev
+	@touch $@
+
+$(VENV)/.built: $(VENV)/.tools $(SOURCES)
+	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet --extras all
+	@touch $@

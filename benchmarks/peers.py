@@ -1,0 +1,183 @@
+"""What surfsig is compared with, and how each peer's program is made ready.
+
+The Python peers live in an environment of their own (`.venv-peers`); PCL and CGAL are compiled into one
+program where their headers and a C++ compiler are installed. What cannot be had is left out, with the reason.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import venv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+ENVIRONMENT = ROOT / ".venv-peers"
+BUILD = ROOT / "build" / "benchmarks"
+TIME_LIMIT_SECONDS = 1800
+
+Command = list[str | Path]
+
+
+class PeerUnavailable(Exception):
+    """A peer cannot be built, installed or run here; the message says why."""
+
+
+@dataclass(frozen=True)
+class Peer:
+    """One method of another library.
+
+    `counterpart` names the measurement of surfsig that it is compared with; `queries` is the number of points
+    timed where all of them would take too long (0: all), always with the full cloud as search surface.
+    """
+
+    name: str
+    label: str
+    computes: str
+    counterpart: str
+    program: str
+    queries: int = 0
+    by_default: bool = True
+
+
+PEERS = (
+    Peer("pcl_normals", "PCL NormalEstimationOMP", "normal, surface variation", "curvature", "c++"),
+    Peer(
+        "pcl_curvatures",
+        "PCL PrincipalCurvatures",
+        "spread of the neighbours' normals, normals given",
+        "curvature",
+        "c++",
+    ),
+    Peer("cgal_jet2", "CGAL jet, degree 2", "k1, k2, directions, normal", "curvature", "c++", queries=20_000),
+    Peer(
+        "cgal_jet4",
+        "CGAL jet, degree 4",
+        "k1, k2, directions, normal",
+        "curvature",
+        "c++",
+        queries=10_000,
+        by_default=False,
+    ),
+    Peer("open3d_normals", "Open3D estimate_normals", "normal", "curvature", "python"),
+    Peer("jakteristics", "jakteristics", "4 shape features of the covariance", "curvature", "python"),
+    Peer("small_gicp", "small_gicp", "normal, covariance (nearest k)", "curvature", "python"),
+    Peer("pcl_fpfh", "PCL FPFHEstimationOMP", "FPFH, 33 numbers, normals given", "signatures", "c++"),
+    Peer(
+        "open3d_fpfh",
+        "Open3D compute_fpfh_feature",
+        "FPFH, 33 numbers, normals given",
+        "signatures",
+        "python",
+    ),
+)
+
+
+def run_json(command: Command, threads: int) -> dict[str, Any]:
+    """Run a program that prints one JSON line, with OpenMP held to `threads`, and return what it printed.
+
+    Raises
+    ------
+    PeerUnavailable
+        When it fails or does not end within half an hour.
+    """
+    environment = os.environ | {"OMP_NUM_THREADS": str(threads), "PYTHONWARNINGS": "ignore"}
+    try:
+        run = subprocess.run(
+            command, capture_output=True, text=True, timeout=TIME_LIMIT_SECONDS, env=environment, check=True
+        )
+        answer: dict[str, Any] = json.loads(run.stdout.splitlines()[-1])
+    except subprocess.TimeoutExpired:
+        raise PeerUnavailable(f"not finished within {TIME_LIMIT_SECONDS} s") from None
+    except subprocess.CalledProcessError as error:
+        raise PeerUnavailable(last_line(error.stderr) or f"exit status {error.returncode}") from None
+    except (OSError, IndexError, ValueError) as error:
+        raise PeerUnavailable(str(error)) from None
+    return answer
+
+
+def last_line(text: str) -> str:
+    """Return the last line of a program's complaint, which says most."""
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return lines[-1] if lines else ""
+
+
+def python_program() -> Command:
+    """Return the command of the Python peers and install what is missing; one without a wheel stays out.
+
+    Raises
+    ------
+    PeerUnavailable
+        When their environment cannot be made.
+    """
+    python = ENVIRONMENT / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    if not python.exists():
+        try:
+            venv.create(ENVIRONMENT, with_pip=True)
+        except subprocess.CalledProcessError as error:
+            raise PeerUnavailable(f"cannot make {ENVIRONMENT.name}: {error}") from None
+        (ENVIRONMENT / ".gitignore").write_text("*\n")
+    for requirement in (HERE / "requirements-peers.txt").read_text().splitlines():
+        if requirement.startswith("#"):
+            continue
+        pip: Command = [python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", requirement]
+        run = subprocess.run(pip, capture_output=True, text=True)
+        if run.returncode:
+            print(f"{requirement} is left out: {last_line(run.stderr)}", file=sys.stderr)
+    return [python, HERE / "peers_python.py"]
+
+
+def cpp_program() -> Command:
+    """Return the command of the PCL and CGAL program, compiling it where it is older than its source.
+
+    Raises
+    ------
+    PeerUnavailable
+        When the compiler or the headers are missing, or it does not compile.
+    """
+    candidates = (os.environ.get("CXX", ""), "g++", "clang++")
+    compiler = next(filter(None, map(shutil.which, candidates)), None)
+    if compiler is None:
+        raise PeerUnavailable("no C++ compiler")
+    source, program = HERE / "peers_pcl_cgal.cpp", BUILD / "peers_pcl_cgal"
+    if program.exists() and program.stat().st_mtime > source.stat().st_mtime:
+        return [program]
+    BUILD.mkdir(parents=True, exist_ok=True)
+    # Not -march=native: the packaged PCL is built without AVX, and Eigen would align its types differently.
+    command: Command = [
+        compiler,
+        "-O3",
+        "-DNDEBUG",
+        "-fopenmp",
+        "-std=c++17",
+        *include_flags(),
+        source,
+        "-o",
+        program,
+    ]
+    libraries = [f"-lpcl_{part}" for part in ("features", "search", "kdtree", "octree", "common")]
+    run = subprocess.run([*command, *libraries, "-lgmp", "-lmpfr"], capture_output=True, text=True)
+    if run.returncode:
+        errors = [line for line in run.stderr.splitlines() if "error" in line]
+        raise PeerUnavailable(errors[0] if errors else last_line(run.stderr))
+    return [program]
+
+
+def include_flags() -> list[str]:
+    """Return where PCL's and Eigen's headers are: as pkg-config says, otherwise in the usual places."""
+    if shutil.which("pkg-config"):
+        query = ["pkg-config", "--cflags", "pcl_features"]
+        answer = subprocess.run(query, capture_output=True, text=True)
+        if answer.returncode == 0:
+            return answer.stdout.split()
+    for prefix in (Path("/usr/include"), Path("/usr/local/include"), Path("/opt/homebrew/include")):
+        found = sorted(prefix.glob("pcl-*"))
+        if found:
+            return [f"-I{found[-1]}", f"-I{prefix / 'eigen3'}"]
+    raise PeerUnavailable("PCL's headers are not installed (Debian: apt-get install libpcl-dev libcgal-dev)")

@@ -1,0 +1,148 @@
+//! Extraction, watched from Python.
+
+use crate::to_python;
+use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+use surfsig::{ExtractOptions, Extraction, FitAxes, Monitor, Offsets, PointCloud, Queries, Radius};
+
+/// How often the interpreter is asked for signals and told the progress.
+const WATCH_INTERVAL: Duration = Duration::from_millis(50);
+
+/// An (n, 3) array of either precision, contiguous.
+#[derive(FromPyObject)]
+pub enum Points<'py> {
+    F32(PyReadonlyArray2<'py, f32>),
+    F64(PyReadonlyArray2<'py, f64>),
+}
+
+impl Points<'_> {
+    fn cloud(&self, origin: [f64; 3]) -> PyResult<PointCloud<'_>> {
+        let offsets = match self {
+            Self::F32(array) => Offsets::F32(rows(array)?),
+            Self::F64(array) => Offsets::F64(rows(array)?),
+        };
+        Ok(PointCloud { offsets, origin })
+    }
+}
+
+fn rows<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<&'a [[T; 3]]> {
+    let (rows, rest) = array.as_slice()?.as_chunks::<3>();
+    let three_columns = rest.is_empty() && array.as_array().ncols() == 3;
+    three_columns.then_some(rows).ok_or_else(|| PyValueError::new_err("expected an array of shape (n, 3)"))
+}
+
+/// Places at which curvature is asked for.
+#[derive(FromPyObject)]
+pub enum At<'py> {
+    Indices(PyReadonlyArray1<'py, u32>),
+    Positions(PyReadonlyArray2<'py, f64>),
+}
+
+/// Extract curvature; see `surfsig.extract` for what the arguments and the arrays mean.
+#[pyfunction]
+#[pyo3(signature = (points, *, origin, radius, axes, at=None, viewpoint=None, threads=None, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
+pub fn extract<'py>(
+    py: Python<'py>,
+    points: Points<'py>,
+    origin: [f64; 3],
+    radius: f64,
+    axes: &str,
+    at: Option<At<'py>>,
+    viewpoint: Option<[f64; 3]>,
+    threads: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let cloud = points.cloud(origin)?;
+    let queries = match &at {
+        None => Queries::All,
+        Some(At::Indices(indices)) => Queries::Indices(indices.as_slice()?),
+        Some(At::Positions(positions)) => Queries::Positions(PointCloud::new_f64(rows(positions)?)),
+    };
+    let axes = match axes {
+        "surface" => FitAxes::Surface,
+        "sensor" => FitAxes::Sensor,
+        other => return Err(PyValueError::new_err(format!("unknown axes '{other}'"))),
+    };
+    let radius = Radius::new(radius).map_err(to_python)?;
+    let options = ExtractOptions { axes, viewpoint, threads, instruction_set: None };
+    let monitor = Monitor::default();
+    let total = queries.len(&cloud);
+    let run = || surfsig::extract_monitored(&cloud, radius, &queries, &options, &monitor);
+    let report = || -> PyResult<()> {
+        Python::attach(|py| {
+            py.check_signals()?;
+            progress.as_ref().map_or(Ok(()), |call| call.call1(py, (monitor.done(), total)).map(|_| ()))
+        })
+    };
+    let extraction = py.detach(|| watched(run, report, || monitor.cancel()))?;
+    report()?;
+    to_arrays(py, extraction)
+}
+
+/// Runs the work on a thread of its own, so that this one can answer Ctrl-C.
+fn watched<T: Send>(
+    run: impl FnOnce() -> Result<T, surfsig::Error> + Send,
+    report: impl Fn() -> PyResult<()>,
+    cancel: impl Fn(),
+) -> PyResult<T> {
+    std::thread::scope(|scope| {
+        let (sender, receiver) = channel();
+        scope.spawn(move || {
+            // Nobody listens only where the interpreter has already given up.
+            let _ = sender.send(run());
+        });
+        loop {
+            match receiver.recv_timeout(WATCH_INTERVAL) {
+                Ok(result) => return result.map_err(to_python),
+                Err(RecvTimeoutError::Timeout) => report().inspect_err(|_| cancel())?,
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(pyo3::exceptions::PyRuntimeError::new_err("the extraction's thread panicked"));
+                }
+            }
+        }
+    })
+}
+
+/// Moves the columns into NumPy arrays, without a copy.
+fn to_arrays(py: Python<'_>, extraction: Extraction) -> PyResult<Bound<'_, PyDict>> {
+    fn matrix<const N: usize>(py: Python<'_>, rows: Vec<[f32; N]>) -> PyResult<Bound<'_, PyAny>> {
+        let count = rows.len();
+        Ok(PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])?.into_any())
+    }
+    let arrays = PyDict::new(py);
+    arrays.set_item("k1", extraction.k1.into_pyarray(py))?;
+    arrays.set_item("k2", extraction.k2.into_pyarray(py))?;
+    arrays.set_item("normals", matrix(py, extraction.normals)?)?;
+    arrays.set_item("directions", matrix(py, extraction.directions)?)?;
+    arrays.set_item("residual", extraction.residual.into_pyarray(py))?;
+    arrays.set_item("condition", extraction.condition.into_pyarray(py))?;
+    arrays.set_item("count", extraction.count.into_pyarray(py))?;
+    arrays.set_item("status", extraction.status.into_pyarray(py))?;
+    arrays.set_item("linearity", extraction.linearity.into_pyarray(py))?;
+    arrays.set_item("planarity", extraction.planarity.into_pyarray(py))?;
+    arrays.set_item("scattering", extraction.scattering.into_pyarray(py))?;
+    if extraction.axes == FitAxes::Sensor {
+        arrays.set_item("coefficients", matrix(py, extraction.coefficients)?)?;
+    }
+    Ok(arrays)
+}
+
+/// Numbers of the points that stand for their voxels; see `surfsig.extract`.
+#[pyfunction]
+#[pyo3(signature = (points, *, origin, voxel))]
+pub fn voxel_representatives<'py>(
+    py: Python<'py>,
+    points: Points<'py>,
+    origin: [f64; 3],
+    voxel: f64,
+) -> PyResult<Bound<'py, PyArray1<u32>>> {
+    let cloud = points.cloud(origin)?;
+    let voxel = Radius::new(voxel).map_err(to_python)?;
+    let found = py.detach(|| surfsig::voxel_representatives(&cloud, voxel)).map_err(to_python)?;
+    Ok(found.into_pyarray(py))
+}

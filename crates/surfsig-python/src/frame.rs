@@ -1,0 +1,194 @@
+//! The frame, for Python.
+
+use crate::to_python;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use surfsig::{FrameParameters, Levels, MeanCurvatureFormula, Paraboloid, SIGNATURE, Status};
+
+/// A vocabulary of curvature fields (section II of the paper), and its inverse.
+///
+/// All lengths are in patch units, that is, divided by the patch's side D (twice the radius of
+/// an extraction); one frame serves every size of patch.
+///
+/// Parameters
+/// ----------
+/// quadratic, slope, mixed, offset : tuple of (float, int)
+///     Largest absolute value and number of levels, end points included, of a and b, of c and d, of
+///     e, and of f in eq. (5). The defaults are table II's ranges.
+/// as_printed : bool
+///     Eq. (4) with the power 2, as the paper prints it, in place of 3/2.
+///
+/// Raises
+/// ------
+/// InvalidInputError
+///     If a range has no meaning, or if the atoms fail the check of section II.A: an eigenvalue of
+///     F F^T is zero.
+#[pyclass(frozen, module = "surfsig")]
+pub struct Frame {
+    frame: Held,
+}
+
+/// The default frame is made once for the process; others belong to their Python object.
+enum Held {
+    Shared(&'static surfsig::Frame),
+    Own(Box<surfsig::Frame>),
+}
+
+impl Frame {
+    fn get(&self) -> &surfsig::Frame {
+        match &self.frame {
+            Held::Shared(frame) => frame,
+            Held::Own(frame) => frame,
+        }
+    }
+
+    fn own(py: Python<'_>, parameters: FrameParameters) -> PyResult<Self> {
+        let frame = py.detach(|| surfsig::Frame::new(parameters)).map_err(to_python)?;
+        Ok(Self { frame: Held::Own(Box::new(frame)) })
+    }
+}
+
+/// Signatures as rows, and a status for each.
+type Rows<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<u8>>);
+
+fn rows<'py>(
+    py: Python<'py>,
+    len: usize,
+    fill: impl FnOnce(&mut [[f32; SIGNATURE]], &mut [Status]) + Send,
+) -> PyResult<Rows<'py>> {
+    let mut rows = vec![[0.0; SIGNATURE]; len];
+    let mut statuses = vec![Status::Ok; len];
+    py.detach(|| fill(&mut rows, &mut statuses));
+    let numbers: Vec<u8> = statuses.into_iter().map(|status| status as u8).collect();
+    let rows = PyArray1::from_vec(py, rows.into_flattened()).reshape([len, SIGNATURE])?;
+    Ok((rows, numbers.into_pyarray(py)))
+}
+
+fn paraboloid(surface: [f64; 6]) -> Paraboloid {
+    let [a, b, c, d, e, f] = surface;
+    Paraboloid { a, b, c, d, e, f }
+}
+
+#[pymethods]
+impl Frame {
+    #[new]
+    #[pyo3(signature = (*, quadratic=(4.0, 21), slope=(1.0, 5), mixed=(4.0, 21), offset=(0.5, 9), as_printed=false))]
+    fn new(
+        py: Python<'_>,
+        quadratic: (f64, usize),
+        slope: (f64, usize),
+        mixed: (f64, usize),
+        offset: (f64, usize),
+        as_printed: bool,
+    ) -> PyResult<Self> {
+        let levels = |(max, count)| Levels { max, count };
+        let formula =
+            if as_printed { MeanCurvatureFormula::AsPrinted } else { MeanCurvatureFormula::Corrected };
+        let [quadratic, slope, mixed, offset] = [quadratic, slope, mixed, offset].map(levels);
+        Self::own(py, FrameParameters { quadratic, slope, mixed, offset, formula })
+    }
+
+    /// The frame of the default parameters: table II, the power 3/2, 9,159 atoms. Made once.
+    #[staticmethod]
+    fn default(py: Python<'_>) -> Self {
+        Self { frame: Held::Shared(py.detach(surfsig::Frame::shared)) }
+    }
+
+    /// The frame of the paper's reproduction: table II, eq. (4) as printed, 3,109 atoms, smallest
+    /// eigenvalue of F F^T 2.37e-4 in metres (the paper: about 2.5e-4).
+    #[staticmethod]
+    fn reproduction(py: Python<'_>) -> PyResult<Self> {
+        Self::own(py, FrameParameters::reproduction())
+    }
+
+    fn __len__(&self) -> usize {
+        self.get().len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Frame({} atoms, hash={})", self.get().len(), self.get().parameters().hash())
+    }
+
+    /// A name for the frame's parameters that files can carry: 16 hexadecimal digits.
+    #[getter]
+    fn hash(&self) -> String {
+        self.get().parameters().hash()
+    }
+
+    /// Whether eq. (4) is used as printed, with the power 2 in place of 3/2.
+    #[getter]
+    fn as_printed(&self) -> bool {
+        self.get().parameters().formula == MeanCurvatureFormula::AsPrinted
+    }
+
+    /// The atoms' a, b, c, d, e, f of eq. (5) in patch units: (n, 6) float64.
+    #[getter]
+    fn atoms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let atoms: Vec<f64> = self.get().atoms().flat_map(|p| [p.a, p.b, p.c, p.d, p.e, p.f]).collect();
+        PyArray1::from_vec(py, atoms).reshape([self.get().len(), 6])
+    }
+
+    /// Singular values of F in patch units, descending: (242,) float64.
+    #[getter]
+    fn singular_values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.get().singular_values().collect::<Vec<_>>().into_pyarray(py)
+    }
+
+    /// Smallest eigenvalue of F F^T for patches of the given side, with curvature per unit of the
+    /// side's own length; `side=1.0` gives it in patch units.
+    fn smallest_eigenvalue(&self, side: f64) -> f64 {
+        self.get().smallest_eigenvalue(side)
+    }
+
+    /// alpha, the curvature fields of a surface a, b, c, d, e, f in patch units: (242,) float64, K on
+    /// the 11 x 11 grid column by column, then H.
+    fn curvature_fields<'py>(&self, py: Python<'py>, surface: [f64; 6]) -> Bound<'py, PyArray1<f64>> {
+        let formula = self.get().parameters().formula;
+        paraboloid(surface).curvature_fields(formula).to_vec().into_pyarray(py)
+    }
+
+    /// c = pinv(F) alpha, eq. (2), of a surface a, b, c, d, e, f in patch units: one number per atom,
+    /// in the order of `atoms`. Its lengths and dot products are those of the 242 numbers of a
+    /// signature.
+    fn coefficients<'py>(&self, py: Python<'py>, surface: [f64; 6]) -> Bound<'py, PyArray1<f64>> {
+        py.detach(|| self.get().coefficients(&paraboloid(surface))).into_pyarray(py)
+    }
+
+    /// Signatures of surfaces in their own axes: (m, 242) float32 and (m,) status numbers.
+    #[pyo3(signature = (k1, k2, *, side))]
+    fn signatures_of_curvatures<'py>(
+        &self,
+        py: Python<'py>,
+        k1: PyReadonlyArray1<'py, f32>,
+        k2: PyReadonlyArray1<'py, f32>,
+        side: f64,
+    ) -> PyResult<Rows<'py>> {
+        let (k1, k2) = (k1.as_slice()?, k2.as_slice()?);
+        if k1.len() != k2.len() {
+            return Err(PyValueError::new_err("k1 and k2 must have the same length"));
+        }
+        let curvatures: Vec<[f32; 2]> = k1.iter().zip(k2).map(|(k1, k2)| [*k1, *k2]).collect();
+        rows(py, curvatures.len(), |rows, statuses| {
+            self.get().signatures_of_curvatures(side, &curvatures, rows, statuses);
+        })
+    }
+
+    /// Signatures of surfaces a, b, c, d, e, f, (m, 6) in the cloud's unit: (m, 242) float32 and (m,)
+    /// status numbers.
+    #[pyo3(signature = (surfaces, *, side))]
+    fn signatures_of_surfaces<'py>(
+        &self,
+        py: Python<'py>,
+        surfaces: PyReadonlyArray2<'py, f32>,
+        side: f64,
+    ) -> PyResult<Rows<'py>> {
+        let (surfaces, rest) = surfaces.as_slice()?.as_chunks::<6>();
+        if !rest.is_empty() {
+            return Err(PyValueError::new_err("expected an array of shape (m, 6)"));
+        }
+        rows(py, surfaces.len(), |rows, statuses| {
+            self.get().signatures_of_surfaces(side, surfaces, rows, statuses);
+        })
+    }
+}

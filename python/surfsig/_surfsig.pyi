@@ -1,0 +1,61 @@
+"""The compiled core: what it offers to the package."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+STATUS_NAMES: list[str]
+INSTRUCTION_SET: str
+OPTIMAL: float
+GOOD: float
+
+def extract(
+    points: NDArray[np.floating],
+    *,
+    origin: Sequence[float],
+    radius: float,
+    axes: str,
+    at: NDArray[np.uint32] | NDArray[np.float64] | None = None,
+    viewpoint: Sequence[float] | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> dict[str, NDArray[Any]]: ...
+def voxel_representatives(
+    points: NDArray[np.floating], *, origin: Sequence[float], voxel: float
+) -> NDArray[np.uint32]: ...
+@final
+class Frame:
+    def __new__(
+        cls,
+        *,
+        quadratic: tuple[float, int] = (4.0, 21),
+        slope: tuple[float, int] = (1.0, 5),
+        mixed: tuple[float, int] = (4.0, 21),
+        offset: tuple[float, int] = (0.5, 9),
+        as_printed: bool = False,
+    ) -> Frame: ...
+    @staticmethod
+    def default() -> Frame: ...
+    @staticmethod
+    def reproduction() -> Frame: ...
+    def __len__(self) -> int: ...
+    @property
+    def hash(self) -> str: ...
+    @property
+    def as_printed(self) -> bool: ...
+    @property
+    def atoms(self) -> NDArray[np.float64]: ...
+    @property
+    def singular_values(self) -> NDArray[np.float64]: ...
+    def smallest_eigenvalue(self, side: float) -> float: ...
+    def curvature_fields(self, surface: Sequence[float]) -> NDArray[np.float64]: ...
+    def coefficients(self, surface: Sequence[float]) -> NDArray[np.float64]: ...
+    def signatures_of_curvatures(
+        self, k1: NDArray[np.float32], k2: NDArray[np.float32], *, side: float
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]: ...
+    def signatures_of_surfaces(
+        self, surfaces: NDArray[np.float32], *, side: float
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]: ...

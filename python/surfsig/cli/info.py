@@ -1,0 +1,75 @@
+"""`surfsig info`: what a file holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+from surfsig.cli.console import number, on_terminal, print_json, print_table, progress_bar
+from surfsig.cli.options import CLOUD, json_option
+
+
+@click.command("info", no_args_is_help=True)
+@click.argument("file", type=CLOUD)
+@json_option
+def info_command(file: Path, as_json: bool) -> None:
+    """Show what a point cloud FILE holds, and how dense it is.
+
+    \b
+    Examples:
+      surfsig info scan.ply
+      surfsig info scan.pcd --json | jq .spacing
+    """  # noqa: D301
+    from surfsig.files import format_name, read
+
+    with progress_bar("reading", "bytes", shown=on_terminal()) as progress:
+        cloud = read(file, progress=progress)
+    values = {"file": str(file), "format": format_name(file), **_describe(cloud)}
+    if as_json:
+        print_json(values)
+    else:
+        print_table(str(file), _rows(values), err=False)
+
+
+def _describe(cloud: Any) -> dict[str, Any]:
+    from surfsig.cli.spacing import median_spacing
+
+    finite = cloud.finite
+    points = cloud.points if finite.all() else cloud.points[finite]
+    return {
+        "points": len(cloud),
+        "finite_points": int(finite.sum()),
+        "grid": cloud.grid,
+        "coordinates": cloud.offsets.dtype.name,
+        "minimum": points.min(axis=0) if len(points) else None,
+        "maximum": points.max(axis=0) if len(points) else None,
+        "viewpoint": cloud.viewpoint,
+        "spacing": median_spacing(points),
+        "fields": {
+            name: values.dtype.name + (f"[{values.shape[1]}]" if values.ndim == 2 else "")
+            for name, values in cloud.fields.items()
+        },
+    }
+
+
+def _rows(values: dict[str, Any]) -> list[tuple[str, str]]:
+    rows = [("format", f"{values['format']}, coordinates {values['coordinates']}")]
+    missing = values["points"] - values["finite_points"]
+    rows.append(("points", f"{values['points']:,}" + (f" ({missing:,} not finite)" if missing else "")))
+    if values["grid"]:
+        rows.append(("organised", f"{values['grid'][0]} rows of {values['grid'][1]}"))
+    if values["minimum"] is not None:
+        for axis, low, high in zip("xyz", values["minimum"], values["maximum"], strict=True):
+            rows.append((axis, f"{low:.9g} to {high:.9g}"))
+    seen_from = values["viewpoint"]
+    rows.append(("viewpoint", "not known" if seen_from is None else ", ".join(number(v) for v in seen_from)))
+    spacing = values["spacing"]
+    if spacing is not None:
+        advice = (
+            f"a radius of 5 to 10 times that ({number(5 * spacing)} to {number(10 * spacing)}) is a start"
+        )
+        rows.append(("spacing", f"{number(spacing)} to the nearest point (median); {advice}"))
+    fields = ", ".join(f"{name} {kind}" for name, kind in values["fields"].items())
+    rows.append(("fields", fields or "none"))
+    return rows

@@ -1,0 +1,12 @@
+"""The one home of each default."""
+
+from typing import Literal
+
+Axes = Literal["surface", "sensor"]
+"""In which axes a paraboloid is fitted."""
+
+AXES: Axes = "surface"
+"""The surface's own: results turn with the object."""
+
+SIGNATURE_BLOCK = 65_536
+"""Signatures that a stream makes at a time: 60 MB."""

@@ -1,0 +1,338 @@
+"""From points to curvature and signatures: `extract` and its result."""
+
+from __future__ import annotations
+
+import enum
+import operator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfsig import _surfsig
+from surfsig._surfsig import Frame
+from surfsig.defaults import AXES, SIGNATURE_BLOCK, Axes
+from surfsig.errors import InvalidInputError
+from surfsig.point_cloud import PointCloud, coordinate_array, position_array
+
+FloatArray = NDArray[np.float32]
+
+
+class Status(enum.IntEnum):
+    """Why a point has the values that it has."""
+
+    OK = 0
+    """All values are there."""
+    NOT_FINITE = 1
+    """A coordinate is not finite: no values."""
+    TOO_FEW_POINTS = 2
+    """Fewer than six points in the ball: no curvature; a normal where three span a plane."""
+    DEGENERATE = 3
+    """The points lie on a line or a conic and determine no paraboloid: no curvature."""
+    NOT_CONVERGED = 4
+    """The surface's own axes did not settle; the values are those of the last turn (edges, corners)."""
+    OUTSIDE_VOCABULARY = 5
+    """More curved than any atom of the frame: curvature, but no signature."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Extraction:
+    """Curvature at m places: one struct of arrays, with a status for each place.
+
+    Lengths are in the cloud's own unit, curvatures per that unit. NaN stands where there is no value.
+    """
+
+    radius: float
+    """Radius of the balls."""
+    axes: Axes
+    """Axes in which the paraboloids were fitted."""
+    oriented: bool
+    """Whether a known viewpoint oriented the normals; otherwise their side, and with it the sign of
+    curvature, is a convention (z, else y, else x of the normal is positive)."""
+    points: NDArray[np.floating]
+    """The places, (m, 3)."""
+    indices: NDArray[np.int64] | None
+    """Their numbers in the cloud, (m,); None for places of their own."""
+    k1: FloatArray
+    """Larger principal curvature by value, (m,); a bump seen from the sensor is positive."""
+    k2: FloatArray
+    """Smaller principal curvature by value, (m,)."""
+    normals: FloatArray
+    """Unit normals, (m, 3), towards the sensor."""
+    directions: FloatArray
+    """Unit tangents along k1, (m, 3); their sign means nothing."""
+    residual: FloatArray
+    """Root mean square of the points' heights above the fit, (m,)."""
+    condition: FloatArray
+    """At least this factor is on the standard error of the worst determined coefficient, (m,)."""
+    count: NDArray[np.uint32]
+    """Points in the ball, (m,), the place itself included where it is a point of the cloud."""
+    status: NDArray[np.uint8]
+    """`Status` as a number, (m,)."""
+    linearity: FloatArray
+    """(l1 - l2) / l1 of the eigenvalues of the ball's covariance, (m,)."""
+    planarity: FloatArray
+    """(l2 - l3) / l1, (m,)."""
+    scattering: FloatArray
+    """l3 / l1, (m,)."""
+    coefficients: FloatArray | None = field(default=None)
+    """In the sensor's axes: a, b, c, d, e, f of eq. (5), (m, 6), about each place, with heights that
+    grow away from the sensor."""
+
+    def __len__(self) -> int:
+        """Return the number of places."""
+        return len(self.k1)
+
+    def __repr__(self) -> str:
+        """Say what was extracted, and how it went."""
+        counts = ", ".join(f"{name}: {n}" for name, n in self.status_counts().items())
+        return f"Extraction({len(self)} places, radius={self.radius:g}, axes={self.axes!r}, {counts})"
+
+    @property
+    def gaussian_curvature(self) -> FloatArray:
+        """K = k1 k2, (m,), per unit squared: table I."""
+        return self.k1 * self.k2
+
+    @property
+    def mean_curvature(self) -> FloatArray:
+        """H = (k1 + k2) / 2, (m,), per unit: table I."""
+        return 0.5 * (self.k1 + self.k2)
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """Where the status is `Status.OK`, (m,)."""
+        return self.status == Status.OK
+
+    def status_counts(self) -> dict[str, int]:
+        """Return how many places have each status, by its name in lower case; none that has none."""
+        counts = np.bincount(self.status, minlength=len(Status))
+        return {status.name.lower(): int(counts[status]) for status in Status if counts[status]}
+
+    @overload
+    def signatures(
+        self,
+        at: ArrayLike | None = ...,
+        *,
+        frame: Frame | None = ...,
+        flat_atom: float | None = ...,
+        return_status: Literal[False] = ...,
+    ) -> FloatArray: ...
+    @overload
+    def signatures(
+        self,
+        at: ArrayLike | None = ...,
+        *,
+        frame: Frame | None = ...,
+        flat_atom: float | None = ...,
+        return_status: Literal[True],
+    ) -> tuple[FloatArray, NDArray[np.uint8]]: ...
+    def signatures(
+        self,
+        at: ArrayLike | None = None,
+        *,
+        frame: Frame | None = None,
+        flat_atom: float | None = None,
+        return_status: bool = False,
+    ) -> FloatArray | tuple[FloatArray, NDArray[np.uint8]]:
+        """Make signatures: the 242 numbers w, which have the lengths and dot products of eq. (2)'s c.
+
+        Parameters
+        ----------
+        at
+            Which places, as numbers (k,) or a mask (m,); all of them by default. For millions, see
+            `iter_signatures`.
+        frame
+            The vocabulary; `Frame.default()` by default.
+        flat_atom
+            Length of one more coordinate, the same for all, appended as the last column. A few times
+            the length of a signature of pure noise, it tells "flat within its error" from "slightly
+            curved".
+        return_status
+            Whether to return the places' statuses too, (k,) uint8, `Status.OUTSIDE_VOCABULARY` among
+            them.
+
+        Returns
+        -------
+        (k, 242) float32, or (k, 243) with a flat atom. Rows are NaN where there is no signature.
+
+        Raises
+        ------
+        InvalidInputError
+            If `at` is no set of places, or `flat_atom` is not a finite number above 0.
+        """
+        places = _places(at, len(self))
+        frame = Frame.default() if frame is None else frame
+        side = 2.0 * self.radius
+        if self.coefficients is None:
+            k1, k2 = np.ascontiguousarray(self.k1[places]), np.ascontiguousarray(self.k2[places])
+            rows, status = frame.signatures_of_curvatures(k1, k2, side=side)
+        else:
+            surfaces = np.ascontiguousarray(self.coefficients[places])
+            rows, status = frame.signatures_of_surfaces(surfaces, side=side)
+        if flat_atom is not None:
+            if not (np.isfinite(flat_atom) and flat_atom > 0):
+                raise InvalidInputError(f"flat_atom must be a finite number above 0, not {flat_atom}")
+            flat = np.full((len(rows), 1), flat_atom, np.float32)
+            flat[np.isnan(rows[:, 0])] = np.nan
+            rows = np.hstack([rows, flat])
+        if not return_status:
+            return rows
+        # The fit's own status says more, but for places that it left in order.
+        fitted = self.status[places]
+        return rows, np.where(status == Status.OK, fitted, status).astype(np.uint8)
+
+    def iter_signatures(
+        self, *, frame: Frame | None = None, block: int = SIGNATURE_BLOCK
+    ) -> Iterator[FloatArray]:
+        """Make the signatures of all places a block at a time, in order.
+
+        Parameters
+        ----------
+        frame
+            The vocabulary; `Frame.default()` by default.
+        block
+            Rows at a time; 242 float32 each.
+
+        Yields
+        ------
+        (block, 242) float32; the last one may be shorter.
+        """
+        for start in range(0, len(self), block):
+            yield self.signatures(np.arange(start, min(start + block, len(self))), frame=frame)
+
+
+def extract(
+    cloud: PointCloud | ArrayLike,
+    radius: float,
+    *,
+    axes: Axes = AXES,
+    at: ArrayLike | None = None,
+    voxel: float | None = None,
+    viewpoint: ArrayLike | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> Extraction:
+    """Extract curvature from the points within a radius: eq. (5), and from it k1, k2, K and H.
+
+    Parameters
+    ----------
+    cloud
+        A `PointCloud`, or an array (n, 3) of numbers. Points that are not finite belong to no ball.
+    radius
+        Radius of the ball around each place, in the cloud's own unit; half the side D of the paper's
+        patch. Finite and above 0.
+    axes
+        "surface": the paraboloid's height runs along its own normal, and the result turns with the
+        object. "sensor": along z, as the paper fits; z runs away from the sensor.
+    at
+        Where: numbers of points (m,), or places of their own (m, 3); every point by default.
+    voxel
+        In place of `at`: one point of each voxel of this size, the one nearest to the mean of the
+        voxel's points.
+    viewpoint
+        Where the sensor stood, (3,), in the cloud's coordinates; by default what the cloud says. It
+        orients the normals, and with them the sign of curvature.
+    threads
+        Number of threads; all cores by default. The result is the same, bit for bit.
+    progress
+        Called with the number of places done and their total, some twenty times a second.
+
+    Returns
+    -------
+    Extraction
+        One struct of arrays, in the order of the places.
+
+    Raises
+    ------
+    InvalidInputError
+        If an argument has no meaning; its text says which.
+    """
+    cloud = cloud if isinstance(cloud, PointCloud) else PointCloud(coordinate_array(cloud))
+    radius = _positive(radius, "radius")
+    if axes not in ("surface", "sensor"):
+        raise InvalidInputError(f"axes must be 'surface' or 'sensor', not {axes!r}")
+    if at is not None and voxel is not None:
+        raise InvalidInputError("at and voxel exclude each other")
+    sensor = cloud.viewpoint if viewpoint is None else position_array(viewpoint, "viewpoint")
+    origin: Sequence[float] = cloud.origin.tolist()
+    indices: NDArray[np.int64] | None
+    query: NDArray[np.uint32] | NDArray[np.float64] | None
+    if voxel is not None:
+        query = _surfsig.voxel_representatives(cloud.offsets, origin=origin, voxel=_positive(voxel, "voxel"))
+        indices, points = query.astype(np.int64), cloud.points[query]
+    elif at is None:
+        query, points = None, cloud.points
+        indices = np.arange(len(cloud))
+    else:
+        query, indices = _queries(at, len(cloud))
+        points = query if indices is None else cloud.points[indices]
+    arrays = _surfsig.extract(
+        cloud.offsets,
+        origin=origin,
+        radius=radius,
+        axes=axes,
+        at=query,
+        viewpoint=None if sensor is None else sensor.tolist(),
+        threads=_threads(threads),
+        progress=progress,
+    )
+    return Extraction(
+        radius=radius, axes=axes, oriented=sensor is not None, points=points, indices=indices, **arrays
+    )
+
+
+def _positive(value: float, what: str) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InvalidInputError(f"{what} must be a number, not {value!r}") from None
+    if not (np.isfinite(number) and number > 0):
+        raise InvalidInputError(f"{what} must be a finite number above 0, not {number:g}")
+    return number
+
+
+def _threads(threads: int | None) -> int | None:
+    if threads is None:
+        return None
+    try:
+        number = operator.index(threads)
+    except TypeError:
+        raise InvalidInputError(f"threads must be a whole number, not {threads!r}") from None
+    if not 1 <= number <= 1024:
+        raise InvalidInputError(f"threads must be 1 to 1024, not {number}")
+    return number
+
+
+def _queries(
+    at: ArrayLike, count: int
+) -> tuple[NDArray[np.uint32] | NDArray[np.float64], NDArray[np.int64] | None]:
+    """Return what the core takes, and the points' numbers where they are points."""
+    array = np.asarray(at)
+    if array.ndim == 2:
+        return coordinate_array(array, "at").astype(np.float64), None
+    indices = _places(array, count).astype(np.int64)
+    return indices.astype(np.uint32), indices
+
+
+def _places(at: ArrayLike | None, count: int) -> NDArray[np.int64]:
+    """Return numbers of places from numbers, of which negative ones count from the end, or a mask."""
+    if at is None:
+        return np.arange(count)
+    array = np.asarray(at)
+    if array.dtype == np.bool_:
+        if array.shape != (count,):
+            raise InvalidInputError(f"at: a mask must have the shape ({count},), not {array.shape}")
+        return np.flatnonzero(array)
+    if array.size == 0:
+        return np.zeros(0, np.int64)
+    if array.ndim != 1 or array.dtype.kind not in "iu":
+        raise InvalidInputError(
+            f"at must be whole numbers (m,), a mask, or places (m, 3), not {array.dtype} {array.shape}"
+        )
+    numbers = array.astype(np.int64)
+    wrong = (numbers < -count) | (numbers >= count)
+    if wrong.any():
+        raise InvalidInputError(f"at: index {numbers[wrong][0]} is outside a cloud of {count} points")
+    return np.where(numbers < 0, numbers + count, numbers)

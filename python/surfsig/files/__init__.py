@@ -1,0 +1,148 @@
+"""Reading and writing point clouds.
+
+A file's format is recognised by its content; only if that says nothing does the extension count. PLY bytes in
+a file called ``scan.pcd`` are therefore read as PLY. What is written has the format of its extension.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+from surfsig.errors import FileFormatError, InvalidInputError
+from surfsig.files import formats
+from surfsig.files.atomic import check_target, replacing
+from surfsig.files.columns import Chunks, output_columns
+from surfsig.files.progress import Progress, ProgressCallback
+from surfsig.point_cloud import PointCloud
+
+__all__ = ["Chunks", "check_writable", "format_name", "read", "write"]
+
+
+def read(path: str | os.PathLike[str], *, progress: ProgressCallback | None = None) -> PointCloud:
+    """Read a point cloud: PLY, PCD, text (XYZ, CSV, TXT, ASC), NPY, NPZ or Parquet.
+
+    Parameters
+    ----------
+    path
+        The file; its content, not its extension, decides how it is read.
+    progress
+        Called with the bytes read so far and the size of the file.
+
+    Returns
+    -------
+    PointCloud
+        Coordinates in the file's precision (text: float64), with all other values of its points as fields.
+
+    Raises
+    ------
+    OSError
+        If the file is missing, a folder, or cannot be opened.
+    FileFormatError
+        If it is no point cloud, broken, or cut off.
+
+    Warns
+    -----
+    UserWarning
+        If the last line of a text file is cut off (it is dropped) or may be, or values are left out that are
+        no numbers.
+    """
+    path = Path(path)
+    with path.open("rb") as file:
+        _, reader = formats.of_content(path, file.read(formats.HEAD_BYTES))
+        file.seek(0)
+        try:
+            return reader(file, str(path), Progress(progress, os.fstat(file.fileno()).st_size))
+        except (MemoryError, InvalidInputError) as error:
+            raise FileFormatError(f"{path}: {error or 'too large for the memory'}") from error
+
+
+def format_name(path: str | os.PathLike[str]) -> str:
+    """Say what format a file has by its content ("PLY", "text", ...).
+
+    Raises
+    ------
+    OSError, FileFormatError
+        As `read`.
+    """
+    path = Path(path)
+    with path.open("rb") as file:
+        kind, _ = formats.of_content(path, file.read(formats.HEAD_BYTES))
+    return kind.name
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Make sure, before a long computation, that `write` will be able to write to `path`.
+
+    Raises
+    ------
+    OSError
+        If the folder is missing or cannot be written to, or the file is read-only.
+    InvalidInputError
+        If the extension is none that can be written, a library for it is missing, or the path is a folder.
+    """
+    path = Path(path)
+    formats.of_output(path)
+    check_target(path)
+
+
+def write(
+    path: str | os.PathLike[str],
+    cloud: PointCloud,
+    columns: Mapping[str, ArrayLike] | None = None,
+    *,
+    chunks: Chunks | tuple[str, int, object, object] | None = None,
+    notes: Mapping[str, str] | None = None,
+    progress: ProgressCallback | None = None,
+) -> None:
+    """Write a cloud with further columns: PLY (binary, little-endian), NPZ or Parquet, by the extension.
+
+    The file appears whole or not at all: a failure (a full disk) leaves an old file as it was.
+
+    Parameters
+    ----------
+    path
+        The file; ``.ply``, ``.npz`` or ``.parquet``.
+    cloud
+        Its points come first (in PLY as double where float would change one of them), then its fields.
+    columns
+        (n,) or (n, k) numbers by name. ``normals`` (n, 3) are written as nx, ny, nz and ``colors`` (n, 3 or
+        4) as red, green, blue (and alpha). In PLY any other (n, k) column becomes NAME_0, NAME_1, ...; in NPZ
+        and Parquet it stays one. A field of the cloud with the same name is kept as ``input_NAME``.
+    chunks
+        One more column, (n, width), given block by block so that it need not fit in memory.
+    notes
+        Words about the whole file (PLY comments, Parquet metadata, the array ``notes`` of NPZ, as JSON).
+    progress
+        Called with the points written so far and their number.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    InvalidInputError
+        If a column has the wrong length or type, or the extension is none that can be written.
+    """
+    path = Path(path)
+    kind, writer = formats.of_output(path)
+    block_column = None if chunks is None else Chunks(*chunks)  # type: ignore[arg-type]
+    taken = set(kind.reserved)
+    if block_column is not None:
+        if block_column.width < 1 or np.dtype(block_column.dtype).kind not in "fiub":
+            raise InvalidInputError(
+                f"column '{block_column.name}' must hold at least one real number per point"
+            )
+        taken.add(block_column.name)
+    told = dict(notes or {})
+    with replacing(path) as file:
+        writer(
+            file,
+            cloud,
+            output_columns(cloud, columns, taken),
+            block_column,
+            told,
+            Progress(progress, len(cloud)),
+        )

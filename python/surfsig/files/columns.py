@@ -1,0 +1,274 @@
+"""Between the columns of a file and a `PointCloud`: names, colours and precision, for every format."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+from surfsig.errors import FileFormatError, InvalidInputError
+from surfsig.point_cloud import PointCloud
+
+# Coordinates printed as text and declared float32 stay float64 where float32 would move a point by more than
+# this share of the cloud's extent (many programs print UTM coordinates in full and declare them "float").
+LOSS_ALLOWED = 1e-6
+
+_COLOURS = {
+    prefix + letter: name
+    for name in ("red", "green", "blue", "alpha")
+    for prefix, letter in (("", name), ("", name[0]), ("diffuse_", name))
+}
+
+
+class Chunks(NamedTuple):
+    """A column too large for the memory, made and written block by block.
+
+    Attributes
+    ----------
+    name
+        Its name; in PLY, which knows single numbers only, `name_0`, `name_1`, ...
+    width
+        Numbers per point.
+    dtype
+        Their type.
+    blocks
+        Arrays of the shape (m_i, width) in the order of the points; the m_i add up to the number of points.
+    """
+
+    name: str
+    width: int
+    dtype: DTypeLike
+    blocks: Iterable[NDArray[Any]]
+
+
+def cloud_from_columns(
+    columns: Mapping[str, NDArray[Any]],
+    *,
+    source: str,
+    viewpoint: ArrayLike | None = None,
+    grid: tuple[int, int] | None = None,
+    declared_float32: bool = False,
+) -> PointCloud:
+    """Make a cloud of named columns: x, y, z in any case, the others as its fields.
+
+    Parameters
+    ----------
+    columns
+        (n,) or (n, k) arrays by name, in the file's order and of any byte order.
+    source
+        The file's name, for messages.
+    viewpoint, grid
+        As in `PointCloud`.
+    declared_float32
+        The coordinates were parsed as float64 from text that declares float32: narrow them where that
+        loses nothing that matters (see `LOSS_ALLOWED`).
+
+    Raises
+    ------
+    FileFormatError
+        If a coordinate is missing.
+    """
+    by_lower_name = {name.lower(): name for name in reversed(list(columns))}
+    missing = [axis for axis in "xyz" if axis not in by_lower_name]
+    if missing:
+        raise FileFormatError(
+            f"{source}: no column '{missing[0]}' among the point's values ({', '.join(columns) or 'none'})"
+        )
+    axes = [by_lower_name[axis] for axis in "xyz"]
+    first = columns[axes[0]]
+    for axis in axes:
+        if columns[axis].dtype.kind not in "fiu":
+            raise FileFormatError(f"{source}: column '{axis}' holds {columns[axis].dtype}, not real numbers")
+    # Joining with float32 gives float32 to small types, and float64 to all that would lose digits.
+    joint = np.result_type(np.float32, *(columns[axis].dtype for axis in axes))
+    offsets = np.empty((len(first), 3), np.float32 if joint == np.float32 else np.float64)
+    for i, axis in enumerate(axes):
+        offsets[:, i] = columns[axis]
+    if declared_float32:
+        offsets = _narrowed(offsets)
+    others = {name: _native(values) for name, values in columns.items() if name not in axes}
+    return PointCloud(
+        offsets,
+        viewpoint=None if viewpoint is None else np.asarray(viewpoint, dtype=np.float64),
+        fields=_with_colours(others),
+        grid=grid,
+    )
+
+
+def output_columns(
+    cloud: PointCloud, columns: Mapping[str, ArrayLike] | None, reserved: Collection[str]
+) -> dict[str, NDArray[Any]]:
+    """Put the input's fields and the new columns into one order with unique names.
+
+    A name that both have is the new column's; the input's field is kept as ``input_NAME``, at the end, where
+    programs that take the first column whose name fits (CloudCompare) find the new one first.
+
+    Parameters
+    ----------
+    cloud
+        Gives the fields.
+    columns
+        (n,) or (n, k) arrays by name; ``normals`` (n, 3) becomes nx, ny, nz and ``colors`` (n, 3 or 4)
+        becomes red, green, blue (and alpha).
+    reserved
+        Names that neither may take (the format's own).
+
+    Raises
+    ------
+    InvalidInputError
+        If a new column has the wrong length or type, or a reserved name.
+    """
+    new: dict[str, NDArray[Any]] = {}
+    for name, values in (columns or {}).items():
+        array = np.asarray(values)
+        if array.ndim not in (1, 2) or len(array) != len(cloud):
+            raise InvalidInputError(
+                f"column '{name}' must have one row for each of the {len(cloud)} points, "
+                f"not the shape {array.shape}"
+            )
+        if array.dtype.kind not in "fiub":
+            raise InvalidInputError(f"column '{name}' must hold real numbers, not {array.dtype}")
+        new.update(_split(name, array))
+    clash = next((name for name in new if name in reserved), None)
+    if clash is not None:
+        raise InvalidInputError(f"a column cannot be called '{clash}' in this format")
+    kept: dict[str, NDArray[Any]] = {}
+    renamed: dict[str, NDArray[Any]] = {}
+    taken = {*reserved, *new, *cloud.fields}
+    for name, values in cloud.fields.items():
+        if name in new or name in reserved:
+            other = "input_" + name
+            while other in taken:
+                other = "input_" + other
+            taken.add(other)
+            renamed[other] = values
+        else:
+            kept[name] = values
+    return {**kept, **new, **renamed}
+
+
+def scalar_columns(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Split (n, k) columns into k columns NAME_0, NAME_1, ... and make names fit for a header of words."""
+    scalars: dict[str, NDArray[Any]] = {}
+    for name, values in columns.items():
+        word = "_".join(name.split()) or "field"
+        parts = [(word, values)]
+        if values.ndim == 2:
+            parts = list(zip(column_names(word, values.shape[1]), values.T, strict=True))
+        for part, column in parts:
+            unique, number = part, 2
+            while unique in scalars:
+                unique, number = f"{part}_{number}", number + 1
+            scalars[unique] = column
+    return scalars
+
+
+def column_names(name: str, width: int) -> list[str]:
+    """Name the single columns of an (n, width) one."""
+    return [f"{name}_{i}" for i in range(width)]
+
+
+def exact_float32(points: NDArray[Any]) -> bool:
+    """Tell whether float32 holds these coordinates without changing any of them."""
+    # Coordinates beyond float32's range become infinite, hence unequal: nothing to warn about.
+    with np.errstate(over="ignore"):
+        return all(
+            np.array_equal(part.astype(np.float32), part, equal_nan=True) for part in blocks_of(points)
+        )
+
+
+def blocks_of(array: NDArray[Any], rows: int = 1 << 16) -> Iterable[NDArray[Any]]:
+    """Cut an array into blocks of rows, so that copies of it stay small."""
+    return (array[start : start + rows] for start in range(0, len(array), rows))
+
+
+def aligned_blocks(chunks: Chunks | None, count: int) -> Iterable[tuple[slice, NDArray[Any] | None]]:
+    """Give the rows to write together: the slice of the points, and the chunked column's block for it.
+
+    Raises
+    ------
+    InvalidInputError
+        If the blocks are not (m, width), or do not add up to `count` rows.
+    """
+    if chunks is None:
+        for start in range(0, count, 1 << 16):
+            yield slice(start, min(count, start + (1 << 16))), None
+        return
+    done = 0
+    for block in chunks.blocks:
+        if block.ndim != 2 or block.shape[1] != chunks.width:
+            raise InvalidInputError(
+                f"a block of '{chunks.name}' has the shape {block.shape}, not (m, {chunks.width})"
+            )
+        rows = slice(done, done + len(block))
+        done += len(block)
+        if done > count:
+            break
+        yield rows, np.ascontiguousarray(block, dtype=chunks.dtype)
+    if done != count:
+        raise InvalidInputError(
+            f"the blocks of '{chunks.name}' hold {done} rows or more, the cloud {count} points"
+        )
+
+
+def columns_of(rows: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    """Take a structured array apart into contiguous columns of the machine's byte order.
+
+    Block by block, because a wide row (signatures: a kilobyte) would otherwise be fetched once per column.
+    """
+    columns: dict[str, NDArray[Any]] = {}
+    for name in rows.dtype.names or ():
+        kind = rows.dtype[name]
+        columns[name] = np.empty((len(rows), *kind.shape), kind.base.newbyteorder("="))
+    for start in range(0, len(rows), 4096):
+        block = rows[start : start + 4096]
+        for name, column in columns.items():
+            column[start : start + 4096] = block[name]
+    return columns
+
+
+def _narrowed(offsets: NDArray[Any]) -> NDArray[Any]:
+    with np.errstate(over="ignore", invalid="ignore"):
+        narrow = offsets.astype(np.float32)
+        loss = np.abs(narrow - offsets)
+    finite = np.isfinite(offsets).all(axis=1)
+    if not finite.any():
+        return narrow
+    extent = np.ptp(offsets[finite], axis=0).max()
+    return narrow if loss[finite].max() <= LOSS_ALLOWED * extent else offsets
+
+
+def _native(values: NDArray[Any]) -> NDArray[Any]:
+    return np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("="))
+
+
+def _split(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    if array.ndim == 2 and name == "normals" and array.shape[1] == 3:
+        return dict(zip(("nx", "ny", "nz"), array.T, strict=True))
+    if array.ndim == 2 and name == "colors" and array.shape[1] in (3, 4):
+        return dict(zip(("red", "green", "blue", "alpha"), array.T, strict=False))
+    return {name: array}
+
+
+def _with_colours(fields: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Call colours red, green, blue and alpha, as uint8, where the values are whole numbers up to 255."""
+    named = {name: _COLOURS[name.lower()] for name in fields if name.lower() in _COLOURS}
+    colours = sorted(set(named.values()) - {"alpha"})
+    if len(set(named.values())) < len(named) or colours != ["blue", "green", "red"]:
+        return fields
+    if not all(_is_byte(fields[name]) for name in named):
+        return fields
+    return {
+        named.get(name, name): values.astype(np.uint8, copy=False) if name in named else values
+        for name, values in fields.items()
+    }
+
+
+def _is_byte(values: NDArray[Any]) -> bool:
+    if values.ndim != 1:
+        return False
+    if values.dtype == np.uint8:
+        return True
+    with np.errstate(invalid="ignore"):
+        return bool(((values >= 0) & (values <= 255) & (values == np.floor(values))).all())

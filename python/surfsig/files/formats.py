@@ -1,0 +1,161 @@
+"""The formats: how a file is recognised, who reads and who writes it. A new format is one entry here."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO, Protocol
+
+from numpy.typing import NDArray
+from surfsig.errors import FileFormatError, InvalidInputError
+from surfsig.files import numpy_files, parquet, pcd, ply, text
+from surfsig.files.columns import Chunks
+from surfsig.files.progress import Progress
+from surfsig.point_cloud import PointCloud
+
+HEAD_BYTES = 4096
+
+
+# Reads from an open file with a name (for messages).
+Reader = Callable[[BinaryIO, str, Progress], PointCloud]
+
+
+class Writer(Protocol):
+    """Writes a cloud with its columns to an open file."""
+
+    def __call__(
+        self,
+        file: BinaryIO,
+        cloud: PointCloud,
+        columns: Mapping[str, NDArray[Any]],
+        chunks: Chunks | None,
+        notes: Mapping[str, str],
+        progress: Progress,
+        /,
+    ) -> None:
+        """Write everything; an exception leaves the file to the caller."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """A file format.
+
+    Attributes
+    ----------
+    name
+        As a person calls it.
+    extensions
+        In lower case, with the dot.
+    recognise
+        Tells from the first bytes whether a file has this format.
+    read
+        Reads from an open file; None if the format is only recognised, to be named in a message.
+    write
+        Writes to an open file; None if the format is not written.
+    check
+        Raises where the format cannot be used here (a library is missing).
+    reserved
+        Names that a column cannot have.
+    """
+
+    name: str
+    extensions: tuple[str, ...]
+    recognise: Callable[[bytes], bool]
+    read: Reader | None = None
+    write: Writer | None = None
+    check: Callable[[], None] = lambda: None
+    reserved: tuple[str, ...] = ("x", "y", "z")
+
+
+def _begins(*marks: bytes) -> Callable[[bytes], bool]:
+    return lambda head: head.startswith(marks)
+
+
+def _matches(pattern: re.Pattern[bytes]) -> Callable[[bytes], bool]:
+    return lambda head: pattern.match(head) is not None
+
+
+def _is_text(head: bytes) -> bool:
+    # UTF-16 begins with its mark; any other text has no zero and hardly a control character.
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return True
+    controls = sum(byte < 9 or 13 < byte < 32 for byte in head)
+    return 0 not in head and controls * 50 <= len(head)
+
+
+_HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
+
+# The order matters: text comes last, because every PCD header and every HTML page is text as well.
+FORMATS = (
+    Format("PLY", (".ply",), _matches(ply.MAGIC), ply.read, ply.write),
+    Format("PCD", (".pcd",), _matches(pcd.MAGIC), pcd.read),
+    Format("NPY", (".npy",), _begins(numpy_files.NPY_MAGIC), numpy_files.read_npy),
+    Format(
+        "NPZ",
+        (".npz",),
+        _begins(numpy_files.ZIP_MAGIC),
+        numpy_files.read_npz,
+        numpy_files.write_npz,
+        reserved=(*numpy_files.RESERVED, "x", "y", "z"),
+    ),
+    Format(
+        "Parquet", (".parquet",), _begins(parquet.MAGIC), parquet.read, parquet.write, parquet.check_available
+    ),
+    Format("LAS or LAZ", (".las", ".laz"), _begins(b"LASF")),
+    Format("E57", (".e57",), _begins(b"ASTM-E57")),
+    Format("PNG image", (".png",), _begins(b"\x89PNG")),
+    Format("JPEG image", (".jpg", ".jpeg"), _begins(b"\xff\xd8\xff")),
+    Format("PDF", (".pdf",), _begins(b"%PDF")),
+    Format("gzip archive", (".gz",), _begins(b"\x1f\x8b")),
+    Format("binary glTF", (".glb",), _begins(b"glTF")),
+    Format("STL", (".stl",), _begins(b"solid ")),
+    Format("HDF5", (".h5", ".hdf5"), _begins(b"\x89HDF")),
+    Format("web page or XML", (".html", ".htm", ".xml"), _matches(_HTML)),
+    Format("text", (".xyz", ".csv", ".txt", ".asc"), _is_text, text.read),
+)
+
+
+def of_content(path: Path, head: bytes) -> tuple[Format, Reader]:
+    """Recognise a file by its first bytes, whatever its extension says.
+
+    Raises
+    ------
+    FileFormatError
+        If it is nothing that can be read; the message says what it is, where that is known.
+    """
+    if not head:
+        raise FileFormatError(f"{path}: the file is empty")
+    by_name = next((kind for kind in FORMATS if path.suffix.lower() in kind.extensions), None)
+    readable = ", ".join(kind.name for kind in FORMATS if kind.read is not None)
+    for kind in FORMATS:
+        if kind.recognise(head):
+            if kind.read is None:
+                raise FileFormatError(
+                    f"{path}: holds {kind.name} data, which cannot be read (only {readable} can)"
+                )
+            return kind, kind.read
+    if by_name is not None:
+        raise FileFormatError(
+            f"{path}: is not a {by_name.name} file, nor any other that can be read ({readable})"
+        )
+    raise FileFormatError(f"{path}: is no point cloud that can be read ({readable})")
+
+
+def of_output(path: Path) -> tuple[Format, Writer]:
+    """Choose the format to write by the extension.
+
+    Raises
+    ------
+    InvalidInputError
+        If nothing is written under this extension, or a library for it is missing.
+    """
+    for kind in FORMATS:
+        if kind.write is not None and path.suffix.lower() in kind.extensions:
+            kind.check()
+            return kind, kind.write
+    known = ", ".join(
+        extension for kind in FORMATS if kind.write is not None for extension in kind.extensions
+    )
+    raise InvalidInputError(f"{path}: the extension must be one of {known}")

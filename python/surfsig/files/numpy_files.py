@@ -1,0 +1,224 @@
+"""NPY and NPZ: NumPy's own files, read without pickle; NPZ is also written."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import warnings
+import zipfile
+import zlib
+from collections.abc import Mapping
+from typing import IO, Any, BinaryIO
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+from surfsig.errors import FileFormatError, InvalidInputError
+from surfsig.files.columns import Chunks, aligned_blocks, blocks_of, cloud_from_columns
+from surfsig.files.progress import Progress
+from surfsig.point_cloud import PointCloud
+
+NPY_MAGIC = npy.MAGIC_PREFIX
+ZIP_MAGIC = b"PK"
+# Names in an NPZ file that are no field of the points.
+RESERVED = ("points", "viewpoint", "grid", "origin", "notes")
+# What a broken ZIP archive raises: RuntimeError if encrypted, NotImplementedError if compressed unusually.
+_BROKEN = (ValueError, EOFError, OSError, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError)
+
+
+def read_npy(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
+    """Read an open NPY file: an array (n, 3 or more), or a structured one (n,) with fields x, y, z.
+
+    Raises
+    ------
+    FileFormatError
+        If it is cut off or no such array.
+    """
+    size = os.fstat(file.fileno()).st_size
+    array = _read_array(file, size, source)
+    progress.advance(size)
+    return _cloud_from_array(array, source)
+
+
+def read_npz(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
+    """Read an open NPZ file.
+
+    The coordinates are the array ``points`` (n, 3 or more), or x, y and z, or the only array of the file;
+    other numeric arrays with n rows become fields. ``viewpoint`` (3,), ``grid`` (2,) and ``origin`` (3,) mean
+    what `PointCloud` says.
+
+    Raises
+    ------
+    FileFormatError
+        If it is cut off, not NumPy's, or has no coordinates.
+    """
+    arrays: dict[str, NDArray[Any]] = {}
+    try:
+        with zipfile.ZipFile(file) as archive:
+            for info in archive.infolist():
+                name = info.filename.removesuffix(".npy")
+                if name == info.filename:
+                    raise FileFormatError(
+                        f"{source}: a ZIP archive, but not of NumPy's arrays (it holds {name[:40]!r})"
+                    )
+                with archive.open(info) as member:
+                    arrays[name] = _read_array(member, info.file_size, f"{source}: {name}")
+                progress.advance(info.compress_size)
+    except FileFormatError:
+        raise
+    except _BROKEN as error:
+        raise FileFormatError(
+            f"{source}: the NPZ archive is cut off or broken ({_one_line(error)})"
+        ) from None
+    notes = {name: arrays.pop(name, None) for name in RESERVED[1:]}
+    if "points" not in arrays and len(arrays) == 1:
+        arrays = {"points": next(iter(arrays.values()))}
+    if "points" in arrays:
+        main = _cloud_from_array(arrays.pop("points"), source)
+        columns: dict[str, NDArray[Any]] = {axis: main.offsets[:, i] for i, axis in enumerate("xyz")}
+        columns.update(main.fields)
+    elif {"x", "y", "z"} <= arrays.keys():
+        columns = {axis: arrays.pop(axis).ravel() for axis in "xyz"}
+        if len({len(values) for values in columns.values()}) > 1:
+            raise FileFormatError(f"{source}: x, y and z differ in length")
+    else:
+        raise FileFormatError(
+            f"{source}: no array 'points', and not x, y, z (it holds {', '.join(arrays) or 'none'})"
+        )
+    count = len(columns["x"])
+    for name, values in arrays.items():
+        if values.dtype.kind in "fiub" and values.ndim in (1, 2) and len(values) == count:
+            columns[name] = values
+        else:
+            warnings.warn(
+                f"{source}: left out the array '{name}' ({values.dtype}, shape {values.shape})", stacklevel=2
+            )
+    try:
+        cloud = cloud_from_columns(
+            columns, source=source, viewpoint=notes["viewpoint"], grid=_grid(notes["grid"])
+        )
+        if notes["origin"] is None:
+            return cloud
+        return PointCloud(cloud.offsets, notes["origin"], cloud.viewpoint, cloud.fields, cloud.grid)
+    except (InvalidInputError, TypeError, ValueError) as error:
+        raise FileFormatError(f"{source}: {error}") from None
+
+
+def write_npz(
+    file: BinaryIO,
+    cloud: PointCloud,
+    columns: Mapping[str, NDArray[Any]],
+    chunks: Chunks | None,
+    notes: Mapping[str, str],
+    progress: Progress,
+) -> None:
+    """Write points and columns, each as an array of its own, uncompressed, so that it can be mapped."""
+    arrays: dict[str, NDArray[Any]] = {"points": cloud.points, **columns}
+    if cloud.viewpoint is not None:
+        arrays["viewpoint"] = cloud.viewpoint
+    if cloud.grid is not None:
+        arrays["grid"] = np.array(cloud.grid)
+    if notes:
+        arrays["notes"] = np.array(json.dumps(dict(notes)))
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
+        for name, array in arrays.items():
+            with _member(archive, name) as member:
+                _write_header(member, array.shape, array.dtype)
+                for block in blocks_of(array) if array.ndim else [array]:
+                    member.write(np.ascontiguousarray(block).tobytes())
+        if chunks is not None:
+            with _member(archive, chunks.name) as member:
+                _write_header(member, (len(cloud), chunks.width), np.dtype(chunks.dtype))
+                for rows, chunk in aligned_blocks(chunks, len(cloud)):
+                    if chunk is not None:
+                        member.write(chunk.tobytes())
+                    progress.advance(rows.stop - rows.start)
+        else:
+            progress.advance(len(cloud))
+
+
+def _member(archive: zipfile.ZipFile, name: str) -> IO[bytes]:
+    # A fixed date: the same points give the same file.
+    info = zipfile.ZipInfo(name.replace("/", "_").replace("\\", "_") + ".npy", (1980, 1, 1, 0, 0, 0))
+    info.external_attr = 0o644 << 16
+    return archive.open(info, "w", force_zip64=True)
+
+
+def _write_header(member: IO[bytes], shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
+    npy.write_array_header_1_0(
+        member, {"descr": npy.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+    )
+
+
+def _read_array(file: IO[bytes], size: int, source: str) -> NDArray[Any]:
+    """Read one array whose file has `size` bytes; nothing is allocated that the file does not hold."""
+    shape, fortran_order, dtype = _read_header(file, source)
+    if dtype.hasobject:
+        raise FileFormatError(f"{source}: holds Python objects, not numbers")
+    needed = math.prod(shape) * dtype.itemsize
+    if min(shape, default=0) < 0 or needed > size:
+        raise FileFormatError(
+            f"{source}: cut off: its header promises an array of the shape {shape} ({needed} bytes), "
+            f"the file has {size}"
+        )
+    try:
+        data = file.read(needed)
+        # One byte more, to have a ZIP member's checksum compared.
+        file.read(1)
+    except _BROKEN as error:
+        raise FileFormatError(f"{source}: cut off or broken ({_one_line(error)})") from None
+    if len(data) != needed:
+        raise FileFormatError(
+            f"{source}: cut off: {needed} bytes of data are promised, {len(data)} are there"
+        )
+    if not dtype.itemsize:
+        raise FileFormatError(f"{source}: points must be real numbers, not {dtype}")
+    return np.frombuffer(data, dtype).reshape(shape, order="F" if fortran_order else "C")
+
+
+def _read_header(file: IO[bytes], source: str) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    readers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+    try:
+        version = npy.read_magic(file)
+        if version in readers:
+            return readers[version](file)
+    # The header is a Python literal: a broken one raises whatever Python's tokeniser or parser may raise.
+    except Exception as error:
+        raise FileFormatError(f"{source}: cut off or broken ({_one_line(error)})") from None
+    raise FileFormatError(f"{source}: NPY version {version[0]}.{version[1]} is not supported")
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:100]
+
+
+def _cloud_from_array(array: NDArray[Any], source: str) -> PointCloud:
+    if array.dtype.names:
+        if array.ndim != 1:
+            raise FileFormatError(
+                f"{source}: a structured array must have one axis, not the shape {array.shape}"
+            )
+        numeric = [name for name in array.dtype.names if array.dtype[name].base.kind in "fiub"]
+        for name in sorted(set(array.dtype.names) - set(numeric)):
+            warnings.warn(f"{source}: left out the field '{name}', which holds no numbers", stacklevel=2)
+        return cloud_from_columns(
+            {
+                name: array[name].reshape(len(array), -1) if array[name].ndim > 1 else array[name]
+                for name in numeric
+            },
+            source=source,
+        )
+    if array.dtype.kind not in "fiu":
+        raise FileFormatError(f"{source}: points must be real numbers, not {array.dtype}")
+    if array.ndim != 2 or array.shape[1] < 3:
+        raise FileFormatError(f"{source}: points must have the shape (n, 3) or wider, not {array.shape}")
+    names = ["x", "y", "z", *(f"column_{i + 1}" for i in range(3, array.shape[1]))]
+    return cloud_from_columns({name: array[:, i] for i, name in enumerate(names)}, source=source)
+
+
+def _grid(values: NDArray[Any] | None) -> tuple[int, int] | None:
+    if values is None:
+        return None
+    height, width = (int(side) for side in values)
+    return height, width

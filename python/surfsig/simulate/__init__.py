@@ -1,0 +1,49 @@
+"""A simulated laser triangulation scanner, to test pipelines on scans whose truth is known.
+
+A :class:`Scene` is made of analytic surfaces, each placed by a rigid pose; a :class:`Scanner` sweeps a laser
+sheet over it and measures what the laser lights *and* the camera sees, with noise, rounding and outliers.
+Metres throughout; heights grow along negative z (:mod:`surfsig.simulate.scanner` draws the axes).
+
+>>> from surfsig import simulate
+>>> ball = simulate.Placed(simulate.Sphere(0.02), simulate.pose((0, 0, -0.02)), "ball")
+>>> table = simulate.Placed(simulate.Rectangle((0.2, 0.2)), simulate.pose((0, 0, 0),
+simulate.facing(simulate.UP))) >>> cloud = simulate.Scanner(noise=5e-5).scan(simulate.Scene([ball, table]),
+seed=1)  # doctest: +SKIP
+"""
+
+from .acquisitions import RANDOM_TILT, Acquisition, Jitter, paper_acquisition, paper_acquisitions
+from .height_field import HeightField
+from .part import PART_SCANNER, part, part_scene
+from .poses import UP, facing, inverse, pose, transform, turn
+from .scanner import Scanner
+from .scene import Hits, Placed, Scene
+from .surfaces import Box, Cone, Cylinder, Plane, Rectangle, Sphere, Surface
+
+__all__ = [
+    "PART_SCANNER",
+    "RANDOM_TILT",
+    "UP",
+    "Acquisition",
+    "Box",
+    "Cone",
+    "Cylinder",
+    "HeightField",
+    "Hits",
+    "Jitter",
+    "Placed",
+    "Plane",
+    "Rectangle",
+    "Scanner",
+    "Scene",
+    "Sphere",
+    "Surface",
+    "facing",
+    "inverse",
+    "paper_acquisition",
+    "paper_acquisitions",
+    "part",
+    "part_scene",
+    "pose",
+    "transform",
+    "turn",
+]
