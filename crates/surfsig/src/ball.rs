@@ -8,7 +8,7 @@ use crate::cell_index::{CellIndex, Row, RowKey};
 use crate::moments::{Moments, Scalar};
 use crate::simd::InstructionSet;
 use crate::simd::accumulate::accumulate;
-use crate::simd::select::{BALL_LIMIT, BLOCK, Block, PADDING, PIECE, Placement, RowPiece, select};
+use crate::simd::select::{BLOCK, Ball, Block, PADDING, Place, Rows, Window, gather};
 
 /// Sees every point of a ball once, in the order of the lattice.
 pub(crate) trait BallVisitor {
@@ -49,7 +49,7 @@ struct NearRow {
     ends: [f32; 2],
     /// From the middle of the present row to the middle of this one, along x.
     along: f32,
-    /// The points of the row that the present run's balls may reach.
+    /// Where the last run's window was: the next is near to it.
     window: std::ops::Range<usize>,
 }
 
@@ -59,50 +59,41 @@ pub(crate) struct DirectWalk<'a> {
     set: InstructionSet,
     scale: f32,
     near: Vec<NearRow>,
-    /// Those of `near` whose window is not empty.
-    in_reach: Vec<usize>,
+    /// What the present run's balls may reach.
+    windows: Vec<Window>,
     block: Box<Block>,
 }
 
 impl<'a> DirectWalk<'a> {
     pub fn new(index: &'a CellIndex, set: InstructionSet) -> Self {
         let scale = (1.0 / index.lattice.radius) as f32;
-        Self { index, set, scale, near: Vec::new(), in_reach: Vec::new(), block: Box::new(Block::new()) }
+        Self { index, set, scale, near: Vec::new(), windows: Vec::new(), block: Box::new(Block::new()) }
     }
 
     /// Shows a visitor the members of the ball around the query at this offset.
     pub fn visit<V: BallVisitor>(&mut self, offset: [f32; 3], visitor: &mut V) {
+        let CellIndex { x, y, z, lattice, .. } = self.index;
+        let rows = Rows { x, y, z };
         let scale = f64::from(self.scale);
-        let half_step = (self.index.lattice.half_step() * scale) as f32;
-        let query = offset.map(|o| f64::from(o) * scale);
+        let ball = Ball {
+            query: offset.map(|o| f64::from(o) * scale),
+            scale: self.scale,
+            half_step: (lattice.half_step() * scale) as f32,
+        };
+        let mut place = Place::default();
         self.block.len = 0;
-        for &near in &self.in_reach {
-            let NearRow { between, window, .. } = &self.near[near];
-            let shift = [0, 1, 2].map(|axis| (between[axis] - query[axis]) as f32);
-            let gap = [1, 2].map(|axis| (shift[axis].abs() - half_step).max(0.0));
-            if gap[0] * gap[0] + gap[1] * gap[1] > BALL_LIMIT {
-                continue;
+        loop {
+            let finished = if V::WANTS_RANKS {
+                gather::<true>(self.set, rows, &self.windows, ball, &mut self.block, &mut place)
+            } else {
+                gather::<false>(self.set, rows, &self.windows, ball, &mut self.block, &mut place)
+            };
+            while self.block.len >= BLOCK {
+                visitor.visit(&self.block, BLOCK);
+                self.block.carry_over();
             }
-            let placement = Placement { scale: self.scale, shift };
-            for start in window.clone().step_by(PIECE) {
-                let len = PIECE.min(window.end - start);
-                let readable = start..start + len + PADDING;
-                let piece = RowPiece {
-                    x: &self.index.x[readable.clone()],
-                    y: &self.index.y[readable.clone()],
-                    z: &self.index.z[readable],
-                    len,
-                    first_rank: start as u32,
-                };
-                if V::WANTS_RANKS {
-                    select::<true>(self.set, piece, placement, &mut self.block);
-                } else {
-                    select::<false>(self.set, piece, placement, &mut self.block);
-                }
-                while self.block.len >= BLOCK {
-                    visitor.visit(&self.block, BLOCK);
-                    self.block.carry_over();
-                }
+            if finished {
+                break;
             }
         }
         let len = self.block.len;
@@ -145,8 +136,8 @@ impl MomentSource for DirectWalk<'_> {
         // than float32 can lose over the length of a row.
         let reach = self.index.lattice.radius as f32 * (1.0 + 2e-5);
         let x = &self.index.x;
-        self.in_reach.clear();
-        for (number, near) in self.near.iter_mut().enumerate() {
+        self.windows.clear();
+        for near in &mut self.near {
             // Distance along y and z from the run's box to the row's cells.
             let gap_y = (near.low[0] - high[1]).max(low[1] - near.high[0]).max(0.0);
             let gap_z = (near.low[1] - high[2]).max(low[2] - near.high[1]).max(0.0);
@@ -164,7 +155,7 @@ impl MomentSource for DirectWalk<'_> {
             let end = seek(x, start..row.end, near.window.end.max(start), |v| v <= to);
             near.window = start..end;
             if start < end {
-                self.in_reach.push(number);
+                self.windows.push(Window { ranks: start..end, between: near.between });
             }
         }
     }

@@ -45,7 +45,7 @@ pub struct Extraction {
     /// Root mean square of the points' heights above the fit.
     pub residual: Vec<f32>,
     /// How much, at least, the worst determined coefficient suffers from the points' arrangement: the
-    /// factor on its standard error (1: not at all; about 3.5 on a full disc).
+    /// factor on its standard error (1: not at all; about 1.5 on a full disc).
     pub condition: Vec<f32>,
     /// Points in the ball, the query itself included where it is one of the cloud's.
     pub count: Vec<u32>,

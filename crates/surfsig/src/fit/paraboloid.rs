@@ -215,7 +215,7 @@ impl Solution {
 /// Normal equations of eq. (5) by L D L^T; the unknowns in the order f, c, d, a, e, b of 1, u, v, uu, uv, vv.
 #[inline(always)]
 fn solve(m: &PatchMoments) -> Solution {
-    // Which moment stands in row i, column j <= i: the product of monomials i and j.
+    // Which moment stands in row i, column j <= i: the product of monomials i and j. The rest is not read.
     const PRODUCT: [[usize; UNKNOWNS]; UNKNOWNS] = [
         [0, 0, 0, 0, 0, 0],
         [1, 3, 0, 0, 0, 0],
@@ -224,32 +224,34 @@ fn solve(m: &PatchMoments) -> Solution {
         [4, 7, 8, 11, 12, 0],
         [5, 8, 9, 12, 13, 14],
     ];
-    let mut lower = [[Lanes::ZERO; UNKNOWNS]; UNKNOWNS];
-    let mut scaled = [[Lanes::ZERO; UNKNOWNS]; UNKNOWNS];
-    let mut inverse_pivot = [Lanes::ZERO; UNKNOWNS];
+    // Filled by a copy, and factored in place: rows above the present one hold L.
+    let mut lower: [[Lanes; UNKNOWNS]; UNKNOWNS] =
+        std::array::from_fn(|i| std::array::from_fn(|j| m.plane[PRODUCT[i][j]]));
+    let mut inverse_pivot = [Lanes::ONE; UNKNOWNS];
     let mut forward = m.height;
     let mut residual_square = m.height_square;
     let mut smallest_pivot = Lanes::ONE;
     for i in 0..UNKNOWNS {
-        for j in 0..=i {
-            let mut value = m.plane[PRODUCT[i][j]];
+        let diagonal = lower[i][i];
+        let mut pivot = diagonal;
+        for j in 0..i {
+            // This row is L D, up to j.
+            let mut value = lower[i][j];
             for k in 0..j {
-                value = (-scaled[i][k]).mul_add(lower[j][k], value);
+                value = (-lower[i][k]).mul_add(lower[j][k], value);
             }
-            if j < i {
-                // scaled = L D, lower = L.
-                scaled[i][j] = value;
-                lower[i][j] = value * inverse_pivot[j];
-            } else {
-                // The tiny number makes 0 / 0, where all points are equal, a pivot of 0.
-                let relative = value / (m.plane[PRODUCT[i][i]] + Lanes::splat(1e-300));
-                smallest_pivot = relative.min(smallest_pivot);
-                inverse_pivot[i] = Lanes::ONE / value;
-            }
+            lower[i][j] = value;
         }
-        for k in 0..i {
-            forward[i] = (-lower[i][k]).mul_add(forward[k], forward[i]);
+        for j in 0..i {
+            let scaled = lower[i][j] * inverse_pivot[j];
+            pivot = (-lower[i][j]).mul_add(scaled, pivot);
+            forward[i] = (-scaled).mul_add(forward[j], forward[i]);
+            lower[i][j] = scaled;
         }
+        // The tiny number makes 0 / 0, where all points are equal, a pivot of 0.
+        let relative = pivot / (diagonal + Lanes::splat(1e-300));
+        smallest_pivot = relative.min(smallest_pivot);
+        inverse_pivot[i] = Lanes::ONE / pivot;
         residual_square = (-forward[i]).mul_add(forward[i] * inverse_pivot[i], residual_square);
     }
     let mut unknowns = [Lanes::ZERO; UNKNOWNS];

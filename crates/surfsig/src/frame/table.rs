@@ -48,7 +48,7 @@ impl Table {
             let place = k / STEP + NODES_A_SIDE as f64;
             let first = place.floor() - 1.0;
             let inside = first >= 0.0 && first + 3.0 < NODES as f64;
-            inside.then(|| (first as usize, place - first - 1.0))
+            inside.then_some((first as usize, place - first - 1.0))
         };
         let (Some((i, s)), Some((j, t))) = (locate(k1), locate(k2)) else {
             return false;

@@ -1,30 +1,61 @@
 //! The 34 sums beyond the count, over a block of points in structure-of-arrays order.
 
-use super::for_each_instruction_set;
 use super::select::{BLOCK, Block};
+use super::{InstructionSet, for_each_instruction_set};
 use crate::moments::{MOMENTS, Scalar, slot};
 
 /// Lanes that the points are dealt to, one after the other, on every instruction set.
 const VIRTUAL_LANES: usize = 16;
 
+/// What each virtual lane has summed.
+type LaneSums<S> = [[S; VIRTUAL_LANES]; MOMENTS];
+
+/// The sums over the first `len` points of the block. The slots beyond `len`, up to a multiple of 16,
+/// must be zero: they then add nothing.
+pub(crate) fn accumulate<S: Scalar>(set: InstructionSet, block: &Block, len: usize) -> [S; MOMENTS] {
+    let mut lanes = [[S::default(); VIRTUAL_LANES]; MOMENTS];
+    sum_lanes(set, block, len, &mut lanes);
+    let mut sums = reduce_lanes(set, &lanes);
+    sums[0] = S::from_f64(len as f64);
+    sums
+}
+
 for_each_instruction_set! {
-    /// The sums over the first `len` points of the block. The slots beyond `len`, up to a multiple
-    /// of 16, must be zero: they then add nothing.
-    #[inline]
-    pub(crate) fn accumulate<S: Scalar>(block: &Block, len: usize) -> [S; MOMENTS] {
-        plain: accumulate_in::<S, 4>,
-        wide: accumulate_in::<S, 8>,
-        widest: accumulate_in::<S, 16>,
+    /// The points dealt to lanes, and each lane summed.
+    fn sum_lanes<S: Scalar>(block: &Block, len: usize, lanes: &mut LaneSums<S>) {
+        plain: accumulate_in::<S, 16>,
+        wide: accumulate_in::<S, 32>,
+        widest: accumulate_in::<S, 64>,
+    }
+}
+
+for_each_instruction_set! {
+    /// The lanes of each sum added up. A function of its own: compiled together with the loops, the
+    /// lanes would be taken out of their registers one by one.
+    #[inline(never)]
+    fn reduce_lanes<S: Scalar>(lanes: &LaneSums<S>) -> [S; MOMENTS] {
+        plain: reduce,
+        wide: reduce,
+        widest: reduce,
+    }
+}
+
+/// As many lanes at a time as a register of `BYTES` holds.
+#[inline(always)]
+fn accumulate_in<S: Scalar, const BYTES: usize>(block: &Block, len: usize, lanes: &mut LaneSums<S>) {
+    match BYTES / size_of::<S>() {
+        2 => accumulate_lanes::<S, 2>(block, len, lanes),
+        4 => accumulate_lanes::<S, 4>(block, len, lanes),
+        8 => accumulate_lanes::<S, 8>(block, len, lanes),
+        _ => accumulate_lanes::<S, 16>(block, len, lanes),
     }
 }
 
 /// Each pass keeps only as many sums as there are registers.
 #[inline(always)]
-fn accumulate_in<S: Scalar, const WIDTH: usize>(block: &Block, len: usize) -> [S; MOMENTS] {
+fn accumulate_lanes<S: Scalar, const WIDTH: usize>(block: &Block, len: usize, lanes: &mut LaneSums<S>) {
     assert!(len <= BLOCK);
-    let mut sums = [S::default(); MOMENTS];
-    sums[0] = S::from_f64(len as f64);
-    pass::<S, WIDTH, 9>(block, len, &mut sums, &PLANE, |x, y, _| {
+    pass::<S, WIDTH, 9>(block, len, lanes, &PLANE, |x, y, _| {
         let (xx, xy, yy) = (mul(x, x), mul(x, y), mul(y, y));
         [
             (x, None),
@@ -38,7 +69,7 @@ fn accumulate_in<S: Scalar, const WIDTH: usize>(block: &Block, len: usize) -> [S
             (xy, Some(xy)),
         ]
     });
-    pass::<S, WIDTH, 9>(block, len, &mut sums, &HEIGHT, |x, y, z| {
+    pass::<S, WIDTH, 9>(block, len, lanes, &HEIGHT, |x, y, z| {
         let (xx, xy, yy) = (mul(x, x), mul(x, y), mul(y, y));
         [
             (yy, Some(y)),
@@ -52,7 +83,7 @@ fn accumulate_in<S: Scalar, const WIDTH: usize>(block: &Block, len: usize) -> [S
             (yy, Some(z)),
         ]
     });
-    pass::<S, WIDTH, 8>(block, len, &mut sums, &HEIGHT_CUBIC, |x, y, z| {
+    pass::<S, WIDTH, 8>(block, len, lanes, &HEIGHT_CUBIC, |x, y, z| {
         let (xx, yy, xz, yz) = (mul(x, x), mul(y, y), mul(x, z), mul(y, z));
         [
             (x, Some(z)),
@@ -65,7 +96,7 @@ fn accumulate_in<S: Scalar, const WIDTH: usize>(block: &Block, len: usize) -> [S
             (xz, Some(xz)),
         ]
     });
-    pass::<S, WIDTH, 8>(block, len, &mut sums, &HEIGHT_SQUARE, |x, y, z| {
+    pass::<S, WIDTH, 8>(block, len, lanes, &HEIGHT_SQUARE, |x, y, z| {
         let (zz, xz, yz) = (mul(z, z), mul(x, z), mul(y, z));
         [
             (x, Some(zz)),
@@ -78,7 +109,6 @@ fn accumulate_in<S: Scalar, const WIDTH: usize>(block: &Block, len: usize) -> [S
             (zz, Some(zz)),
         ]
     });
-    sums
 }
 
 /// Slots of the sums that each pass takes, in the order in which its terms stand above.
@@ -133,11 +163,10 @@ const HEIGHT_SQUARE: [usize; 8] = [
 fn pass<S: Scalar, const WIDTH: usize, const TERMS: usize>(
     block: &Block,
     len: usize,
-    sums: &mut [S; MOMENTS],
+    lanes: &mut LaneSums<S>,
     slots: &[usize; TERMS],
     terms: impl Fn([S; WIDTH], [S; WIDTH], [S; WIDTH]) -> [([S; WIDTH], Option<[S; WIDTH]>); TERMS],
 ) {
-    let mut lanes = [[S::default(); VIRTUAL_LANES]; TERMS];
     for part in 0..VIRTUAL_LANES / WIDTH {
         let first = part * WIDTH;
         let mut totals = [[S::default(); WIDTH]; TERMS];
@@ -154,12 +183,9 @@ fn pass<S: Scalar, const WIDTH: usize, const TERMS: usize>(
                 }
             }
         }
-        for (lanes, total) in lanes.iter_mut().zip(&totals) {
-            lanes[first..first + WIDTH].copy_from_slice(total);
+        for (total, &slot) in totals.iter().zip(slots) {
+            lanes[slot][first..first + WIDTH].copy_from_slice(total);
         }
-    }
-    for (lanes, &slot) in lanes.iter().zip(slots) {
-        sums[slot] = reduce(lanes);
     }
 }
 
@@ -182,21 +208,25 @@ fn mul<S: Scalar, const WIDTH: usize>(a: [S; WIDTH], b: [S; WIDTH]) -> [S; WIDTH
     product
 }
 
-/// Sums the lanes in a fixed order: the same tree on every instruction set.
+/// Sums each row's lanes in a fixed order, the same tree on every instruction set.
 #[inline(always)]
-fn reduce<S: Scalar>(lanes: &[S; VIRTUAL_LANES]) -> S {
-    let mut sums = *lanes;
-    for half in [8, 4, 2, 1] {
-        for l in 0..half {
-            sums[l] = sums[l] + sums[l + half];
+fn reduce<S: Scalar>(lanes: &LaneSums<S>) -> [S; MOMENTS] {
+    let mut sums = [S::default(); MOMENTS];
+    for (sum, lanes) in sums.iter_mut().zip(lanes) {
+        let mut partial = *lanes;
+        for half in [8, 4, 2, 1] {
+            for l in 0..half {
+                partial[l] += partial[l + half];
+            }
         }
+        *sum = partial[0];
     }
-    sums[0]
+    sums
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{InstructionSet, select::BLOCK};
+    use super::super::select::BLOCK;
     use super::*;
     use crate::moments::Moments;
 

@@ -37,7 +37,8 @@ impl InstructionSet {
         let mut sets = vec![Self(Kind::Baseline)];
         #[cfg(target_arch = "x86_64")]
         {
-            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            let fused = is_x86_feature_detected!("fma") && is_x86_feature_detected!("popcnt");
+            if fused && is_x86_feature_detected!("avx2") {
                 sets.push(Self(Kind::Avx2));
                 if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
                     sets.push(Self(Kind::Avx512));
@@ -69,22 +70,22 @@ macro_rules! for_each_instruction_set {
         $(#[$doc])*
         $vis fn $name $(<$scalar: $bound>)? (set: $crate::simd::InstructionSet, $($arg: $type),*) $(-> $ret)? {
             #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx2,fma")]
+            #[target_feature(enable = "avx2,fma,popcnt")]
             fn avx2 $(<$scalar: $bound>)? ($($arg: $type),*) $(-> $ret)? {
                 ($wide)($($arg),*)
             }
             #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx512f,avx512vl,avx2,fma")]
+            #[target_feature(enable = "avx512f,avx512vl,avx2,fma,popcnt")]
             fn avx512 $(<$scalar: $bound>)? ($($arg: $type),*) $(-> $ret)? {
                 ($widest)($($arg),*)
             }
             match set.0 {
                 $crate::simd::instruction_set::Kind::Baseline => ($plain)($($arg),*),
                 // SAFETY: an `InstructionSet` with this value exists only where the processor has
-                // reported AVX2 and FMA.
+                // reported AVX2, FMA and POPCNT.
                 #[cfg(target_arch = "x86_64")]
                 $crate::simd::instruction_set::Kind::Avx2 => unsafe { avx2($($arg),*) },
-                // SAFETY: as above, for AVX-512 F and VL.
+                // SAFETY: as above, and AVX-512 F and VL.
                 #[cfg(target_arch = "x86_64")]
                 $crate::simd::instruction_set::Kind::Avx512 => unsafe { avx512($($arg),*) },
             }

@@ -48,65 +48,132 @@ impl Block {
     }
 }
 
-/// A piece of a row: at most [`PIECE`] points, readable for [`PADDING`] slots beyond `len`.
+/// The coordinates of all points in rows, each array readable for [`PADDING`] slots beyond the last.
 #[derive(Clone, Copy)]
-pub(crate) struct RowPiece<'a> {
+pub(crate) struct Rows<'a> {
     pub x: &'a [f32],
     pub y: &'a [f32],
     pub z: &'a [f32],
-    pub len: usize,
-    pub first_rank: u32,
+}
+
+/// A part of a row that a ball may reach, by ranks, and where the row is.
+#[derive(Clone)]
+pub(crate) struct Window {
+    pub ranks: std::ops::Range<usize>,
+    /// The middle of the row's cells, from the middle of the query's row, in units of the radius.
+    pub between: [f64; 3],
+}
+
+/// The ball that is being walked through.
+#[derive(Clone, Copy)]
+pub(crate) struct Ball {
+    /// The query, from the middle of its row, in units of the radius.
+    pub query: [f64; 3],
+    /// One over the radius.
+    pub scale: f32,
+    /// Half the size of a row along y and z, in units of the radius.
+    pub half_step: f32,
+}
+
+/// How far a walk has come: the window, and the rank within it.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Place {
+    window: usize,
+    rank: usize,
 }
 
 /// How a row's offsets become offsets from the ball's centre in units of its radius: `scale * offset + shift`.
 #[derive(Clone, Copy)]
-pub(crate) struct Placement {
-    pub scale: f32,
-    pub shift: [f32; 3],
+struct Placement {
+    scale: f32,
+    shift: [f32; 3],
 }
 
-/// Appends the piece's points that lie in the ball to `block`.
+/// Appends members of the ball to `block`, from `place` on, until the block holds [`BLOCK`] of them or
+/// more (`false`) or the windows are at their end (`true`).
 #[inline]
-pub(crate) fn select<const RANKS: bool>(
+pub(crate) fn gather<const RANKS: bool>(
     set: InstructionSet,
-    piece: RowPiece<'_>,
-    placement: Placement,
+    rows: Rows<'_>,
+    windows: &[Window],
+    ball: Ball,
     block: &mut Block,
-) {
-    assert!(piece.len <= PIECE && block.len < BLOCK);
-    let readable = piece.x.len().min(piece.y.len()).min(piece.z.len());
-    assert!(readable >= piece.len + PADDING);
+    place: &mut Place,
+) -> bool {
     match set.0 {
-        Kind::Baseline => select_baseline::<RANKS>(piece, placement, block),
-        // SAFETY: the value of `set` proves AVX2 and FMA; the two asserts above are its other conditions.
+        Kind::Baseline => gather_by(rows, windows, ball, block, place, select_baseline::<RANKS>),
+        // SAFETY: the value of `set` proves AVX2, FMA and POPCNT.
         #[cfg(target_arch = "x86_64")]
-        Kind::Avx2 => unsafe { x86::select_avx2::<RANKS>(piece, placement, block) },
-        // SAFETY: the value of `set` proves AVX-512 F; the two asserts above are its other conditions.
+        Kind::Avx2 => unsafe { x86::gather_avx2::<RANKS>(rows, windows, ball, block, place) },
+        // SAFETY: the value of `set` proves AVX-512 F and POPCNT.
         #[cfg(target_arch = "x86_64")]
-        Kind::Avx512 => unsafe { x86::select_avx512::<RANKS>(piece, placement, block) },
+        Kind::Avx512 => unsafe { x86::gather_avx512::<RANKS>(rows, windows, ball, block, place) },
     }
+}
+
+/// The walk from window to window; `select` appends the members among some ranks of one row.
+#[inline(always)]
+fn gather_by(
+    rows: Rows<'_>,
+    windows: &[Window],
+    ball: Ball,
+    block: &mut Block,
+    place: &mut Place,
+    select: impl Fn(Rows<'_>, std::ops::Range<usize>, Placement, &mut Block),
+) -> bool {
+    let readable = rows.x.len().min(rows.y.len()).min(rows.z.len());
+    while let Some(window) = windows.get(place.window) {
+        let mut shift = [0.0; 3];
+        for axis in 0..3 {
+            shift[axis] = (window.between[axis] - ball.query[axis]) as f32;
+        }
+        let gap_y = (shift[1].abs() - ball.half_step).max(0.0);
+        let gap_z = (shift[2].abs() - ball.half_step).max(0.0);
+        if gap_y * gap_y + gap_z * gap_z <= BALL_LIMIT {
+            let placement = Placement { scale: ball.scale, shift };
+            let mut start = window.ranks.start.max(place.rank);
+            while start < window.ranks.end {
+                if block.len >= BLOCK {
+                    place.rank = start;
+                    return false;
+                }
+                let end = window.ranks.end.min(start + PIECE);
+                assert!(end + PADDING <= readable);
+                select(rows, start..end, placement, block);
+                start = end;
+            }
+        }
+        *place = Place { window: place.window + 1, rank: 0 };
+    }
+    true
 }
 
 /// Eight distances at a time, which the compiler vectorises; then a store of every point, of which
 /// the next overwrites those that are outside.
-fn select_baseline<const RANKS: bool>(piece: RowPiece<'_>, placement: Placement, block: &mut Block) {
+#[inline(always)]
+fn select_baseline<const RANKS: bool>(
+    rows: Rows<'_>,
+    ranks: std::ops::Range<usize>,
+    placement: Placement,
+    block: &mut Block,
+) {
     const WIDTH: usize = 8;
     let Placement { scale, shift } = placement;
-    for start in (0..piece.len).step_by(WIDTH) {
+    for start in ranks.clone().step_by(WIDTH) {
         let lane = |row: &[f32], l: usize, axis: usize| row[start + l].mul_add(scale, shift[axis]);
-        let x: [f32; WIDTH] = std::array::from_fn(|l| lane(piece.x, l, 0));
-        let y: [f32; WIDTH] = std::array::from_fn(|l| lane(piece.y, l, 1));
-        let z: [f32; WIDTH] = std::array::from_fn(|l| lane(piece.z, l, 2));
+        let x: [f32; WIDTH] = std::array::from_fn(|l| lane(rows.x, l, 0));
+        let y: [f32; WIDTH] = std::array::from_fn(|l| lane(rows.y, l, 1));
+        let z: [f32; WIDTH] = std::array::from_fn(|l| lane(rows.z, l, 2));
         let inside: [bool; WIDTH] = std::array::from_fn(|l| {
             let square = z[l].mul_add(z[l], y[l].mul_add(y[l], x[l] * x[l]));
-            square <= BALL_LIMIT && start + l < piece.len
+            square <= BALL_LIMIT && start + l < ranks.end
         });
         for l in 0..WIDTH {
             block.x[block.len] = x[l];
             block.y[block.len] = y[l];
             block.z[block.len] = z[l];
             if RANKS {
-                block.rank[block.len] = piece.first_rank + (start + l) as u32;
+                block.rank[block.len] = (start + l) as u32;
             }
             block.len += usize::from(inside[l]);
         }
@@ -115,18 +182,19 @@ fn select_baseline<const RANKS: bool>(piece: RowPiece<'_>, placement: Placement,
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{BALL_LIMIT, Block, Placement, RowPiece};
+    use super::{BALL_LIMIT, Ball, Block, Place, Placement, Rows, Window, gather_by};
     use std::arch::x86_64::*;
+    use std::ops::Range;
 
     /// For each mask of eight lanes, the lanes that are set, packed to the left.
     static PACK_LEFT: [[i32; 8]; 256] = {
         let mut table = [[0; 8]; 256];
         let mut mask = 0;
         while mask < 256 {
-            let (mut lane, mut packed) = (0, 0);
+            let (mut lane, mut packed) = (0, 0_usize);
             while lane < 8 {
                 if mask >> lane & 1 == 1 {
-                    table[mask][packed] = lane as i32;
+                    table[mask][packed] = lane;
                     packed += 1;
                 }
                 lane += 1;
@@ -136,12 +204,43 @@ mod x86 {
         table
     };
 
+    #[target_feature(enable = "avx2,fma,popcnt")]
+    pub(super) fn gather_avx2<const RANKS: bool>(
+        rows: Rows<'_>,
+        windows: &[Window],
+        ball: Ball,
+        block: &mut Block,
+        place: &mut Place,
+    ) -> bool {
+        gather_by(rows, windows, ball, block, place, |rows, ranks, placement, block| {
+            // SAFETY: `gather_by` checks that the rows are readable for 16 slots beyond the ranks, of
+            // which it hands on at most `PIECE`, and only while the block holds less than `BLOCK`.
+            unsafe { select_avx2::<RANKS>(rows, ranks, placement, block) }
+        })
+    }
+
+    #[target_feature(enable = "avx512f,avx512vl,avx2,fma,popcnt")]
+    pub(super) fn gather_avx512<const RANKS: bool>(
+        rows: Rows<'_>,
+        windows: &[Window],
+        ball: Ball,
+        block: &mut Block,
+        place: &mut Place,
+    ) -> bool {
+        gather_by(rows, windows, ball, block, place, |rows, ranks, placement, block| {
+            // SAFETY: as in `gather_avx2`.
+            unsafe { select_avx512::<RANKS>(rows, ranks, placement, block) }
+        })
+    }
+
     /// # Safety
-    /// The processor has AVX2 and FMA; `piece` is readable for 16 slots beyond its length, which is
-    /// at most `PIECE`; `block.len < BLOCK`, so that every store ends inside the block's arrays.
-    #[target_feature(enable = "avx2,fma")]
-    pub(super) unsafe fn select_avx2<const RANKS: bool>(
-        piece: RowPiece<'_>,
+    /// The rows are readable for 16 slots beyond `ranks`, which are at most `PIECE`; `block.len <
+    /// BLOCK`, so that every store ends inside the block's arrays.
+    #[inline]
+    #[target_feature(enable = "avx2,fma,popcnt")]
+    unsafe fn select_avx2<const RANKS: bool>(
+        rows: Rows<'_>,
+        ranks: Range<usize>,
         placement: Placement,
         block: &mut Block,
     ) {
@@ -150,42 +249,44 @@ mod x86 {
         let limit = _mm256_set1_ps(BALL_LIMIT);
         let iota = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
         let mut end = block.len;
-        for start in (0..piece.len).step_by(8) {
-            // SAFETY: start < piece.len, and the rows are readable for 16 slots beyond that.
-            let (x, y, z) = unsafe {
-                (
-                    _mm256_fmadd_ps(_mm256_loadu_ps(piece.x.as_ptr().add(start)), scale, sx),
-                    _mm256_fmadd_ps(_mm256_loadu_ps(piece.y.as_ptr().add(start)), scale, sy),
-                    _mm256_fmadd_ps(_mm256_loadu_ps(piece.z.as_ptr().add(start)), scale, sz),
-                )
-            };
+        // SAFETY (of every call): start < ranks.end, and the rows are readable for 16 slots beyond
+        // that; end < BLOCK + PIECE, since a block grows by at most the number of ranks, and its arrays
+        // are 16 slots longer; a mask has eight bits, and the table 256 rows.
+        let mut keep = |start: usize, valid: usize| unsafe {
+            let x = _mm256_fmadd_ps(_mm256_loadu_ps(rows.x.as_ptr().add(start)), scale, sx);
+            let y = _mm256_fmadd_ps(_mm256_loadu_ps(rows.y.as_ptr().add(start)), scale, sy);
+            let z = _mm256_fmadd_ps(_mm256_loadu_ps(rows.z.as_ptr().add(start)), scale, sz);
             let square = _mm256_fmadd_ps(z, z, _mm256_fmadd_ps(y, y, _mm256_mul_ps(x, x)));
-            let inside = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(square, limit)) as usize;
-            let valid = 0xff >> 8usize.saturating_sub(piece.len - start);
-            let mask = inside & valid;
-            // SAFETY: end < BLOCK + PIECE, since a block grows by at most the piece's length, and the
-            // arrays are 16 slots longer; a mask has eight bits, the table 256 rows.
-            unsafe {
-                let pack = _mm256_loadu_si256(PACK_LEFT.get_unchecked(mask).as_ptr().cast());
-                _mm256_storeu_ps(block.x.as_mut_ptr().add(end), _mm256_permutevar8x32_ps(x, pack));
-                _mm256_storeu_ps(block.y.as_mut_ptr().add(end), _mm256_permutevar8x32_ps(y, pack));
-                _mm256_storeu_ps(block.z.as_mut_ptr().add(end), _mm256_permutevar8x32_ps(z, pack));
-                if RANKS {
-                    let first = _mm256_set1_epi32((piece.first_rank + start as u32) as i32);
-                    let rank = _mm256_permutevar8x32_epi32(_mm256_add_epi32(first, iota), pack);
-                    _mm256_storeu_si256(block.rank.as_mut_ptr().add(end).cast(), rank);
-                }
+            let mask = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(square, limit)) as usize & valid;
+            let pack = _mm256_loadu_si256(PACK_LEFT.get_unchecked(mask).as_ptr().cast());
+            _mm256_storeu_ps(block.x.as_mut_ptr().add(end), _mm256_permutevar8x32_ps(x, pack));
+            _mm256_storeu_ps(block.y.as_mut_ptr().add(end), _mm256_permutevar8x32_ps(y, pack));
+            _mm256_storeu_ps(block.z.as_mut_ptr().add(end), _mm256_permutevar8x32_ps(z, pack));
+            if RANKS {
+                let rank = _mm256_add_epi32(_mm256_set1_epi32(start as i32), iota);
+                let rank = _mm256_permutevar8x32_epi32(rank, pack);
+                _mm256_storeu_si256(block.rank.as_mut_ptr().add(end).cast(), rank);
             }
             end += mask.count_ones() as usize;
+        };
+        let mut start = ranks.start;
+        while start + 8 <= ranks.end {
+            keep(start, 0xff);
+            start += 8;
+        }
+        if start < ranks.end {
+            keep(start, 0xff >> (start + 8 - ranks.end));
         }
         block.len = end;
     }
 
     /// # Safety
-    /// The processor has AVX-512 F; otherwise as [`select_avx2`].
-    #[target_feature(enable = "avx512f")]
-    pub(super) unsafe fn select_avx512<const RANKS: bool>(
-        piece: RowPiece<'_>,
+    /// As [`select_avx2`].
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512vl,avx2,fma,popcnt")]
+    unsafe fn select_avx512<const RANKS: bool>(
+        rows: Rows<'_>,
+        ranks: Range<usize>,
         placement: Placement,
         block: &mut Block,
     ) {
@@ -194,32 +295,31 @@ mod x86 {
         let limit = _mm512_set1_ps(BALL_LIMIT);
         let iota = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
         let mut end = block.len;
-        for start in (0..piece.len).step_by(16) {
-            // SAFETY: start < piece.len, and the rows are readable for 16 slots beyond that.
-            let (x, y, z) = unsafe {
-                (
-                    _mm512_fmadd_ps(_mm512_loadu_ps(piece.x.as_ptr().add(start)), scale, sx),
-                    _mm512_fmadd_ps(_mm512_loadu_ps(piece.y.as_ptr().add(start)), scale, sy),
-                    _mm512_fmadd_ps(_mm512_loadu_ps(piece.z.as_ptr().add(start)), scale, sz),
-                )
-            };
+        // SAFETY (of every call): as in `select_avx2`. Compressing in a register and storing all of it
+        // is faster on some processors than a compressing store.
+        let mut keep = |start: usize, valid: __mmask16| unsafe {
+            let x = _mm512_fmadd_ps(_mm512_loadu_ps(rows.x.as_ptr().add(start)), scale, sx);
+            let y = _mm512_fmadd_ps(_mm512_loadu_ps(rows.y.as_ptr().add(start)), scale, sy);
+            let z = _mm512_fmadd_ps(_mm512_loadu_ps(rows.z.as_ptr().add(start)), scale, sz);
             let square = _mm512_fmadd_ps(z, z, _mm512_fmadd_ps(y, y, _mm512_mul_ps(x, x)));
-            let valid = (0xffff_u32 >> 16usize.saturating_sub(piece.len - start)) as __mmask16;
             let mask = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(valid, square, limit);
-            // SAFETY: end < BLOCK + PIECE, since a block grows by at most the piece's length, and the
-            // arrays are 16 slots longer. Compressing in a register and storing all of it is faster
-            // on some processors than a compressing store.
-            unsafe {
-                _mm512_storeu_ps(block.x.as_mut_ptr().add(end), _mm512_maskz_compress_ps(mask, x));
-                _mm512_storeu_ps(block.y.as_mut_ptr().add(end), _mm512_maskz_compress_ps(mask, y));
-                _mm512_storeu_ps(block.z.as_mut_ptr().add(end), _mm512_maskz_compress_ps(mask, z));
-                if RANKS {
-                    let first = _mm512_set1_epi32((piece.first_rank + start as u32) as i32);
-                    let rank = _mm512_maskz_compress_epi32(mask, _mm512_add_epi32(first, iota));
-                    _mm512_storeu_si512(block.rank.as_mut_ptr().add(end).cast(), rank);
-                }
+            _mm512_storeu_ps(block.x.as_mut_ptr().add(end), _mm512_maskz_compress_ps(mask, x));
+            _mm512_storeu_ps(block.y.as_mut_ptr().add(end), _mm512_maskz_compress_ps(mask, y));
+            _mm512_storeu_ps(block.z.as_mut_ptr().add(end), _mm512_maskz_compress_ps(mask, z));
+            if RANKS {
+                let rank = _mm512_add_epi32(_mm512_set1_epi32(start as i32), iota);
+                let rank = _mm512_maskz_compress_epi32(mask, rank);
+                _mm512_storeu_si512(block.rank.as_mut_ptr().add(end).cast(), rank);
             }
             end += mask.count_ones() as usize;
+        };
+        let mut start = ranks.start;
+        while start + 16 <= ranks.end {
+            keep(start, 0xffff);
+            start += 16;
+        }
+        if start < ranks.end {
+            keep(start, 0xffff >> (start + 16 - ranks.end));
         }
         block.len = end;
     }
@@ -239,19 +339,20 @@ mod tests {
     fn every_instruction_set_keeps_exactly_the_members_in_their_order() {
         let row = |seed: usize| (0..PIECE + PADDING).map(|i| noise(3 * i + seed)).collect::<Vec<_>>();
         let (x, y, z) = (row(0), row(1), row(2));
-        let placement = Placement { scale: 0.7, shift: [0.1, -0.2, 0.05] };
+        let rows = Rows { x: &x, y: &y, z: &z };
+        let ball = Ball { query: [-0.1, 0.2, -0.05], scale: 0.7, half_step: 10.0 };
         for set in InstructionSet::available() {
             for len in [0, 1, 7, 8, 9, 15, 16, 17, 100, PIECE] {
                 let mut block = Block::new();
-                let piece = RowPiece { x: &x, y: &y, z: &z, len, first_rank: 40 };
-                select::<true>(set, piece, placement, &mut block);
+                let windows = [Window { ranks: 0..len, between: [0.0; 3] }];
+                assert!(gather::<true>(set, rows, &windows, ball, &mut block, &mut Place::default()));
                 let expected: Vec<usize> = (0..len)
                     .filter(|&i| {
                         let p = [x[i] * 0.7 + 0.1, y[i] * 0.7 - 0.2, z[i] * 0.7 + 0.05];
                         p.iter().map(|c| c * c).sum::<f32>() <= BALL_LIMIT
                     })
                     .collect();
-                let ranks: Vec<usize> = block.rank[..block.len].iter().map(|&k| k as usize - 40).collect();
+                let ranks: Vec<usize> = block.rank[..block.len].iter().map(|&k| k as usize).collect();
                 assert_eq!(ranks, expected, "{} {len}", set.name());
                 for (slot, &i) in expected.iter().enumerate() {
                     assert_eq!(block.x[slot], x[i].mul_add(0.7, 0.1));
