@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from surfsig.files import write
 from surfsig.point_cloud import PointCloud
 

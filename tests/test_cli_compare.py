@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 import surfsig
 from surfsig.files import read, write
 from surfsig.point_cloud import PointCloud

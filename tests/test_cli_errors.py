@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 import surfsig
 
 COMMANDS = ("info", "extract", "compare", "completion")

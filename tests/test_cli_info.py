@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from surfsig.cli.spacing import median_spacing
 from surfsig.files import write
 from surfsig.point_cloud import PointCloud

@@ -14,6 +14,7 @@ import lzf
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from surfsig.errors import FileFormatError
 from surfsig.files import read, write
 from surfsig.point_cloud import PointCloud
@@ -197,6 +198,7 @@ ABSURD = {
     .replace(b"COUNT 1 1 1", b"COUNT 1 1 99999999999"),
     "npy": npy_header("(99999999999, 3)") + bytes(120),
     "npz": zipped(npy_header("(99999999999, 3)") + bytes(120)),
+    "npy of a gigabyte": npy_header("(100000000, 3)") + bytes(120),
     "negative npy": npy_header("(-1, 3)") + bytes(120),
 }
 

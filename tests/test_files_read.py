@@ -7,6 +7,7 @@ from pathlib import Path
 import lzf
 import numpy as np
 import pytest
+
 from surfsig.errors import FileFormatError
 from surfsig.files import read
 
@@ -187,6 +188,7 @@ def test_pcd_colour_packed_into_a_float(tmp_path: Path, kind: str) -> None:
             {"red": [255, 2], "green": [0, 3], "blue": [1, 4]},
         ),
         ("easting northing height class\n1.5 -2.25 3 7\n4.125 5 -6.5 8\n", {"class": [7, 8]}),
+        ("# from scan.PCD\n1.5 -2.25 3\n4.125 5 -6.5\n", {}),
         ("Points:=[\n[1.5, -2.25, 3.0], \n[4.125, 5.0, -6.5] \n ];\n", {}),
     ],
 )

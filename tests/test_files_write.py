@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from numpy.typing import NDArray
+
 from surfsig.errors import InvalidInputError
 from surfsig.files import Chunks, check_writable, read, write
 from surfsig.point_cloud import PointCloud
@@ -167,6 +168,19 @@ def test_chunks(tmp_path: Path, extension: str, kind: type) -> None:
     assert fields[names[0]].dtype == kind
     np.testing.assert_array_equal(fields["k1"], columns["k1"])
     np.testing.assert_array_equal(fields["intensity"], cloud.fields["intensity"])
+
+
+def test_making_a_block_may_fill_in_other_columns(tmp_path: Path, extension: str) -> None:
+    status = np.zeros(5, np.uint8)
+
+    def blocks() -> Iterator[NDArray[Any]]:
+        for start, stop in ((0, 3), (3, 5)):
+            status[start:stop] = np.arange(start, stop) + 1
+            yield np.zeros((stop - start, 2), np.float32)
+
+    path = tmp_path / f"a.{extension}"
+    write(path, example()[0], {"status": status}, chunks=("signature", 2, np.float32, blocks()))
+    assert read(path).fields["status"].tolist() == [1, 2, 3, 4, 5]
 
 
 def test_chunks_never_are_in_memory_as_a_whole(tmp_path: Path, extension: str) -> None:

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud, coordinate_array
 

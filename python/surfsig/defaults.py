@@ -8,5 +8,8 @@ Axes = Literal["surface", "sensor"]
 AXES: Axes = "surface"
 """The surface's own: results turn with the object."""
 
+RADIUS = 0.02
+"""Half the side of the paper's patch, in metres; where `surfsig compare` is given none."""
+
 SIGNATURE_BLOCK = 65_536
 """Signatures that a stream makes at a time: 60 MB."""

@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Sequence
 
 import click
+
 from surfsig.cli.compare import compare_command
 from surfsig.cli.completion import completion_command
 from surfsig.cli.extract import extract_command

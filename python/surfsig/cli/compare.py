@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
 from surfsig import defaults
 from surfsig.cli.console import number, print_json, print_table
 from surfsig.cli.options import CLOUD, axes_option, json_option, position, threads_option
+
+if TYPE_CHECKING:
+    from surfsig import PointCloud
+    from surfsig.defaults import Axes
 
 
 @click.command("compare", no_args_is_help=True)
@@ -40,7 +45,7 @@ def compare_command(
     b: Path,
     at: tuple[tuple[float, float, float], ...],
     radius: float,
-    axes: str,
+    axes: Axes,
     viewpoint: tuple[float, float, float] | None,
     threads: int | None,
     as_json: bool,
@@ -48,47 +53,55 @@ def compare_command(
     """Compare the surface at a position in A with the surface at a position in B (which may be A).
 
     Shows both places' curvatures and the similarity zeta of their signatures: from 0.9 "optimal", from 0.5
-    "good", below "dissimilar".
+    "good", below "dissimilar". Where nobody says from which side the surfaces were seen
+    (--viewpoint), zeta is the larger one of both sides.
 
     \b
     Examples:
       surfsig compare scan.ply scan.ply --at 0.1,0.2,0.9 --at 0.3,0.2,0.9 --radius 0.02
       surfsig compare scan.ply other.pcd --at 0.1,0.2,0.9 --at 0,0,1 --radius 0.02 --json
     """  # noqa: D301
+    import numpy as np
+
     import surfsig
 
     if len(at) != 2:
         raise click.UsageError("give --at twice: the position in A, then the one in B")
     places: list[dict[str, Any]] = []
     signatures = []
-    clouds: dict[Path, Any] = {}
+    oriented = True
+    clouds: dict[Path, PointCloud] = {}
     for file, spot in zip((a, b), at, strict=True):
         if file not in clouds:
             clouds[file] = surfsig.read(file)
         result = surfsig.extract(
             clouds[file], radius, axes=axes, at=[spot], viewpoint=viewpoint, threads=threads
         )
-        status = surfsig.Status(int(result.status[0]))
-        if status != surfsig.Status.OK:
-            reason = status.name.lower().replace("_", " ")
+        rows, statuses = result.signatures(return_status=True)
+        status = surfsig.Status(int(statuses[0])).name.lower()
+        if not np.isfinite(rows).all():
             where = ",".join(number(value) for value in spot)
-            found = f"{int(result.count[0])} points within {number(radius)}"
-            raise surfsig.InvalidInputError(f"{file}: no signature at {where}: {reason} ({found})")
-        signatures.append(result.signatures()[0])
-        place: dict[str, Any] = {"file": str(file), "at": spot, "count": int(result.count[0])}
+            why = f"{status.replace('_', ' ')} ({int(result.count[0])} points within {number(radius)})"
+            raise surfsig.InvalidInputError(f"{file}: no signature at {where}: {why}")
+        signatures.append(rows[0])
+        oriented = oriented and result.oriented
+        place: dict[str, Any] = {"file": str(file), "at": spot, "status": status}
+        place |= {"count": int(result.count[0])}
         place |= {name: float(getattr(result, name)[0]) for name in ("k1", "k2", "residual")}
         places.append(place)
-    zeta = float(surfsig.similarity(*signatures))
+    either_side = not oriented and axes == "surface"
+    zeta = float(surfsig.similarity(signatures[0], signatures[1], either_side=either_side))
     values = {"a": places[0], "b": places[1], "radius": radius, "axes": axes, "zeta": zeta}
-    values["class"] = surfsig.similarity_class(zeta)
+    # A perfect plane's signature is zero and has no direction to compare.
+    values["class"] = surfsig.similarity_class(zeta) if np.isfinite(zeta) else None
     if as_json:
         print_json(values)
         return
-    rows = [("zeta", f"{number(zeta)} ({values['class']})")]
+    table = [("zeta", f"{number(zeta)} ({values['class'] or 'a perfect plane has no direction to compare'})")]
     for name, place in zip("AB", places, strict=True):
-        rows.append((name, f"{place['file']} at {', '.join(number(value) for value in place['at'])}"))
+        table.append((name, f"{place['file']} at {', '.join(number(value) for value in place['at'])}"))
         curvature = f"k1 {number(place['k1'])}, k2 {number(place['k2'])} per unit"
-        rows.append(
+        table.append(
             ("", f"{curvature}, from {place['count']:,} points, residual {number(place['residual'])}")
         )
-    print_table(f"radius {number(radius)}, {axes} axes", rows, err=False)
+    print_table(f"radius {number(radius)}, {axes} axes", table, err=False)

@@ -63,7 +63,12 @@ def progress_bar(what: str, unit: str, *, shown: bool) -> Iterator[Callable[[int
 
 
 def print_table(title: str, rows: Iterable[tuple[str, str]], *, err: bool) -> None:
-    """Print two columns, the first with names."""
+    """Print two columns, the first with names; in a pipe as plain lines, which are not folded."""
+    if not (sys.stderr if err else sys.stdout).isatty():
+        click.echo(title, err=err)
+        for name, value in rows:
+            click.echo(f"{name:<14}{value}", err=err)
+        return
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from surfsig import defaults
 from surfsig.cli.console import number, on_terminal, print_json, print_table, progress_bar, quantity
 from surfsig.cli.options import CLOUD, axes_option, json_option, position, threads_option
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-    from surfsig import Extraction, PointCloud
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
-# Signatures made and written at a time: 8 MB.
-ROWS_AT_ONCE = 8192
+    from surfsig import Extraction, PointCloud
+    from surfsig.defaults import Axes
+    from surfsig.files import Chunks
+
 QUANTILES = (0.05, 0.5, 0.95)
 
 
@@ -45,7 +50,7 @@ def extract_command(
     radius: float,
     output: Path,
     signatures: bool,
-    axes: str,
+    axes: Axes,
     at: tuple[tuple[float, float, float], ...],
     voxel: float | None,
     viewpoint: tuple[float, float, float] | None,
@@ -66,6 +71,7 @@ def extract_command(
       surfsig extract scan.xyz --radius 0.02 --at 0.1,0.2,0.9 --viewpoint 0,0,0 -o one.parquet
     """  # noqa: D301
     import numpy as np
+
     import surfsig
     from surfsig.files import check_writable, write
 
@@ -89,67 +95,75 @@ def extract_command(
             progress=progress,
         )
     clock.append(time.perf_counter())
+    status = result.status.copy()
     with progress_bar("writing", "points", shown=shown) as progress:
         write(
             output,
-            _output_cloud(cloud, result),
-            _columns(result),
-            chunks=("signature", *_signature_blocks(result)) if signatures else None,
+            cloud if not at and voxel is None else _part_of(cloud, result),
+            _columns(result, status),
+            chunks=_signature_chunks(result, status) if signatures else None,
             notes={"radius": repr(radius), "axes": axes},
             progress=progress,
         )
     clock.append(time.perf_counter())
     seconds = dict(zip(("read", "extract", "write"), np.diff(clock).tolist(), strict=True))
     summary = {"input": str(file), "output": str(output), "radius": radius, "axes": axes}
-    summary |= {"signatures": signatures, **_summary(result), "seconds": seconds}
+    summary |= {"signatures": signatures, **_summary(result, status), "seconds": seconds}
     summary["points_per_second"] = len(result) / seconds["extract"] if seconds["extract"] else None
+    if len(result) and not np.isfinite(result.k1).any():
+        warnings.warn(
+            f"{output}: no point has a curvature; is the radius {number(radius)} right?", stacklevel=1
+        )
     if as_json:
         print_json(summary)
     elif shown:
         print_table(f"{output}, radius {number(radius)}, {axes} axes", _rows(summary), err=True)
 
 
-def _output_cloud(cloud: PointCloud, result: Extraction) -> PointCloud:
-    """Give the points of the result, with the input's fields where they are points of the input."""
-    from surfsig.point_cloud import PointCloud
+def _part_of(cloud: PointCloud, result: Extraction) -> PointCloud:
+    """Give the places of the result, with the input's fields where they are points of the input."""
+    from surfsig import PointCloud
 
-    if len(result) == len(cloud) and result.indices is None:
-        return cloud
     chosen = result.indices
     fields = {} if chosen is None else {name: values[chosen] for name, values in cloud.fields.items()}
     return PointCloud(result.points, viewpoint=cloud.viewpoint, fields=fields)
 
 
-def _columns(result: Extraction) -> dict[str, NDArray[Any]]:
-    columns: dict[str, NDArray[Any]] = {
+def _columns(result: Extraction, status: NDArray[np.uint8]) -> dict[str, ArrayLike]:
+    columns: dict[str, ArrayLike] = {
         name: getattr(result, name)
         for name in ("k1", "k2", "gaussian_curvature", "mean_curvature", "normals")
     }
     columns |= {f"direction_{axis}": result.directions[:, i] for i, axis in enumerate("xyz")}
-    quality = ("residual", "condition", "count", "status", "linearity", "planarity", "scattering")
-    return columns | {name: getattr(result, name) for name in quality}
+    columns |= {"residual": result.residual, "condition": result.condition, "count": result.count}
+    columns |= {"status": status}
+    return columns | {name: getattr(result, name) for name in ("linearity", "planarity", "scattering")}
 
 
-def _signature_blocks(result: Extraction) -> tuple[int, str, Iterator[NDArray[Any]]]:
-    """Give the width, the type and the blocks of the signatures, each made when it is to be written."""
+def _signature_chunks(result: Extraction, status: NDArray[np.uint8]) -> Chunks:
+    """Make signatures when they are to be written; where there is none, that shows in `status`."""
     import numpy as np
 
-    def rows(start: int, stop: int) -> NDArray[Any]:
-        part: NDArray[Any] = result.signatures(at=np.arange(start, min(stop, len(result))))
-        return part
+    from surfsig.files import Chunks
 
-    blocks = (rows(start, start + ROWS_AT_ONCE) for start in range(0, len(result), ROWS_AT_ONCE))
-    return rows(0, 0).shape[1], "float32", blocks
+    def blocks() -> Iterator[NDArray[np.float32]]:
+        for start in range(0, len(result), defaults.SIGNATURE_BLOCK):
+            places = np.arange(start, min(start + defaults.SIGNATURE_BLOCK, len(result)))
+            rows, status[places] = result.signatures(places, return_status=True)
+            yield rows
+
+    return Chunks("signature", result.signatures([]).shape[1], np.float32, blocks())
 
 
-def _summary(result: Extraction) -> dict[str, Any]:
+def _summary(result: Extraction, status: NDArray[np.uint8]) -> dict[str, Any]:
     import numpy as np
-    import surfsig
 
-    counts = np.bincount(result.status, minlength=len(surfsig.Status))
+    from surfsig import Status
+
+    counts = np.bincount(status, minlength=len(Status))
     values: dict[str, Any] = {
         "points": len(result),
-        "status": {status.name.lower(): int(counts[status]) for status in surfsig.Status},
+        "status": {kind.name.lower(): int(counts[kind]) for kind in Status},
     }
     for name in ("k1", "k2"):
         numbers = getattr(result, name)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+
 from surfsig.cli.console import number, on_terminal, print_json, print_table, progress_bar
 from surfsig.cli.options import CLOUD, json_option
 
@@ -60,15 +61,15 @@ def _rows(values: dict[str, Any]) -> list[tuple[str, str]]:
     if values["grid"]:
         rows.append(("organised", f"{values['grid'][0]} rows of {values['grid'][1]}"))
     if values["minimum"] is not None:
+        # What float32 and float64 hold, the last digit of UTM coordinates included.
+        digits = 7 if values["coordinates"] == "float32" else 12
         for axis, low, high in zip("xyz", values["minimum"], values["maximum"], strict=True):
-            rows.append((axis, f"{low:.9g} to {high:.9g}"))
+            rows.append((axis, f"{low:.{digits}g} to {high:.{digits}g}"))
     seen_from = values["viewpoint"]
     rows.append(("viewpoint", "not known" if seen_from is None else ", ".join(number(v) for v in seen_from)))
     spacing = values["spacing"]
     if spacing is not None:
-        advice = (
-            f"a radius of 5 to 10 times that ({number(5 * spacing)} to {number(10 * spacing)}) is a start"
-        )
+        advice = f"a radius of 5 to 10 times that ({5 * spacing:.2g} to {10 * spacing:.2g}) is a start"
         rows.append(("spacing", f"{number(spacing)} to the nearest point (median); {advice}"))
     fields = ", ".join(f"{name} {kind}" for name, kind in values["fields"].items())
     rows.append(("fields", fields or "none"))

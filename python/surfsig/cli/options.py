@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+
 from surfsig import defaults
 
 if TYPE_CHECKING:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
+
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files import formats
 from surfsig.files.atomic import check_target, replacing

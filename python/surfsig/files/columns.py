@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
+
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.point_cloud import PointCloud
 
@@ -34,6 +35,8 @@ class Chunks(NamedTuple):
         Their type.
     blocks
         Arrays of the shape (m_i, width) in the order of the points; the m_i add up to the number of points.
+        The other columns' values for these points are taken after the block, so that making it may still
+        fill them in (whether there is a signature is known when it is made).
     """
 
     name: str

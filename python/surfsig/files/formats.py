@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, Protocol
 
 from numpy.typing import NDArray
+
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files import numpy_files, parquet, pcd, ply, text
 from surfsig.files.columns import Chunks

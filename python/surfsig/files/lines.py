@@ -10,6 +10,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
+
 from surfsig.errors import FileFormatError
 from surfsig.files.progress import Progress
 

@@ -14,6 +14,7 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
+
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.columns import Chunks, aligned_blocks, blocks_of, cloud_from_columns
 from surfsig.files.progress import Progress
@@ -122,11 +123,6 @@ def write_npz(
     if notes:
         arrays["notes"] = np.array(json.dumps(dict(notes)))
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
-        for name, array in arrays.items():
-            with _member(archive, name) as member:
-                _write_header(member, array.shape, array.dtype)
-                for block in blocks_of(array) if array.ndim else [array]:
-                    member.write(np.ascontiguousarray(block).tobytes())
         if chunks is not None:
             with _member(archive, chunks.name) as member:
                 _write_header(member, (len(cloud), chunks.width), np.dtype(chunks.dtype))
@@ -136,6 +132,11 @@ def write_npz(
                     progress.advance(rows.stop - rows.start)
         else:
             progress.advance(len(cloud))
+        for name, array in arrays.items():
+            with _member(archive, name) as member:
+                _write_header(member, array.shape, array.dtype)
+                for block in blocks_of(array) if array.ndim else [array]:
+                    member.write(np.ascontiguousarray(block).tobytes())
 
 
 def _member(archive: zipfile.ZipFile, name: str) -> IO[bytes]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
+
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.columns import Chunks, aligned_blocks, cloud_from_columns
 from surfsig.files.progress import Progress

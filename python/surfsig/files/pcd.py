@@ -9,15 +9,14 @@ from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
+
 from surfsig.errors import FileFormatError
 from surfsig.files.columns import cloud_from_columns, columns_of
 from surfsig.files.lines import take_rows
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
-MAGIC = re.compile(
-    rb"(?:[ \t]*(?:#[^\n]*)?\r?\n)*[ \t]*(?:#[^\n]*PCD|VERSION[ \t]+\.?0?\.?[0-9]|FIELDS[ \t])"
-)
+MAGIC = re.compile(rb"(?:[ \t]*(?:#[^\n]*)?\r?\n)*(?:VERSION[ \t]+\.?0?\.?[0-9]|FIELDS[ \t])")
 MAX_HEADER_BYTES = 1 << 20
 # More numbers per point than any descriptor has; a broken header must not make us build a type of them.
 MAX_NUMBERS = 1 << 16

@@ -10,6 +10,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
+
 from surfsig.errors import FileFormatError
 from surfsig.files.columns import (
     Chunks,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from surfsig.errors import FileFormatError
 from surfsig.files.columns import columns_of
 
