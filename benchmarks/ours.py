@@ -14,9 +14,10 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-import surfsig
 from clouds import NEIGHBOUR_SAMPLE, evenly_spaced
 from timing import add_job_arguments, finite_share, median_seconds, report, seconds_of
+
+import surfsig
 
 RUNS = 5
 SIGNATURE_BLOCK = 250_000

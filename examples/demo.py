@@ -1,6 +1,6 @@
 """Extract a simulated scan of a machined part, and draw what surfsig finds: `make demo`.
 
-    python examples/demo.py [FOLDER]
+python examples/demo.py [FOLDER]
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from numpy.typing import ArrayLike
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -42,14 +43,15 @@ def main(folder: Path) -> None:
         k1, k2 = np.median(s.k1[member]), np.median(s.k2[member])
         print(f"{name:34}{member.sum():8,}{_radius(k1):>12}{_radius(k2):>12}")
 
-    w = s.signatures()
+    flat = surfsig.flat_atom_length(float(np.nanmedian(s.residual)), s.radius, float(np.median(s.count)))
     names = simulate.part_scene().names
     reference = _middle_of(cloud, surface == _first(names, "sphere", "dome"))
-    zeta = surfsig.similarity_matrix(w, w[reference])[:, 0]
+    zeta = s.similarity_to(s.signatures([reference], flat_atom=flat)[0])
     picture = folder / "part.png"
     _draw(s, zeta, reference, picture)
     cloud_file = folder / "part.ply"
-    columns = {"mean_curvature": s.mean_curvature, "k1": s.k1, "k2": s.k2, "zeta": zeta, "normals": s.normals}
+    columns: dict[str, ArrayLike] = {"k1": s.k1, "k2": s.k2, "mean_curvature": s.mean_curvature}
+    columns |= {"zeta": zeta, "normals": s.normals}
     surfsig.write(cloud_file, cloud, columns)
     print(f"\npicture:      {picture}\npoint cloud:  {cloud_file}   (CloudCompare shows its scalar fields)")
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from surfsig import simulate as sim
 from surfsig.errors import InvalidInputError
 

@@ -1,18 +1,19 @@
 """surfsig tells what a scanned surface is.
 
-    import surfsig
+import surfsig
 
-    cloud = surfsig.read("scan.ply")
-    s = surfsig.extract(cloud, radius=0.02)
-    s.k1, s.k2, s.normals, s.status            # curvature, per unit length, at every point
-    w = s.signatures([100, 2000])              # equal surfaces have equal signatures
-    surfsig.similarity(w[0], w[1])             # zeta, between 0 and 1
+cloud = surfsig.read("scan.ply")
+s = surfsig.extract(cloud, radius=0.02)
+s.k1, s.k2, s.normals, s.status            # curvature, per unit length, at every point
+w = s.signatures([100, 2000])              # equal surfaces have equal signatures
+surfsig.similarity(w[0], w[1])             # zeta, between 0 and 1
 """
 
 from surfsig._surfsig import INSTRUCTION_SET, Frame, __version__
 from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
 from surfsig.extraction import Extraction, Status, extract
 from surfsig.files import read, write
+from surfsig.flat_atom import flat_atom_length
 from surfsig.point_cloud import PointCloud
 from surfsig.similarity import flipped, similarity, similarity_class, similarity_matrix
 
@@ -27,6 +28,7 @@ __all__ = [
     "SurfsigError",
     "__version__",
     "extract",
+    "flat_atom_length",
     "flipped",
     "read",
     "similarity",

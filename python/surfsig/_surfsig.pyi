@@ -26,6 +26,7 @@ def extract(
 def voxel_representatives(
     points: NDArray[np.floating], *, origin: Sequence[float], voxel: float
 ) -> NDArray[np.uint32]: ...
+
 @final
 class Frame:
     def __new__(

@@ -13,3 +13,6 @@ RADIUS = 0.02
 
 SIGNATURE_BLOCK = 65_536
 """Signatures that a stream makes at a time: 60 MB."""
+
+FLAT_ATOM_NOISES = 3.0
+"""Length of the flat atom, in lengths of a signature of pure noise."""

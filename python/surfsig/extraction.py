@@ -16,6 +16,7 @@ from surfsig._surfsig import Frame
 from surfsig.defaults import AXES, SIGNATURE_BLOCK, Axes
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud, coordinate_array, position_array
+from surfsig.similarity import SIGNATURE, similarity
 
 FloatArray = NDArray[np.float32]
 
@@ -103,7 +104,8 @@ class Extraction:
     @property
     def ok(self) -> NDArray[np.bool_]:
         """Where the status is `Status.OK`, (m,)."""
-        return self.status == Status.OK
+        ok: NDArray[np.bool_] = self.status == Status.OK
+        return ok
 
     def status_counts(self) -> dict[str, int]:
         """Return how many places have each status, by its name in lower case; none that has none."""
@@ -184,23 +186,58 @@ class Extraction:
         return rows, np.where(status == Status.OK, fitted, status).astype(np.uint8)
 
     def iter_signatures(
-        self, *, frame: Frame | None = None, block: int = SIGNATURE_BLOCK
-    ) -> Iterator[FloatArray]:
-        """Make the signatures of all places a block at a time, in order.
+        self, *, frame: Frame | None = None, flat_atom: float | None = None, block: int = SIGNATURE_BLOCK
+    ) -> Iterator[tuple[slice, FloatArray, NDArray[np.uint8]]]:
+        """Make the signatures of all places a block at a time, in order, for more than memory holds.
 
         Parameters
         ----------
-        frame
-            The vocabulary; `Frame.default()` by default.
+        frame, flat_atom
+            As in `signatures`.
         block
-            Rows at a time; 242 float32 each.
+            Rows at a time.
 
         Yields
         ------
-        (block, 242) float32; the last one may be shorter.
+        Which places, their signatures (k, 242) or (k, 243), and their statuses (k,).
         """
         for start in range(0, len(self), block):
-            yield self.signatures(np.arange(start, min(start + block, len(self))), frame=frame)
+            places = slice(start, min(start + block, len(self)))
+            rows, status = self.signatures(
+                np.arange(places.start, places.stop), frame=frame, flat_atom=flat_atom, return_status=True
+            )
+            yield places, rows, status
+
+    def similarity_to(self, signature: ArrayLike, *, frame: Frame | None = None) -> FloatArray:
+        """Compare every place with one signature: where else is this surface?
+
+        Parameters
+        ----------
+        signature
+            (242,), or (243,) with a flat atom, which the places then get too. It must have been made
+            at the same radius, in the same axes, and with the same frame.
+        frame
+            The vocabulary; `Frame.default()` by default.
+
+        Returns
+        -------
+        zeta of eq. (12), (m,); of the more similar side where no viewpoint is known, in the surface's
+        axes. NaN where there is no signature.
+
+        Raises
+        ------
+        InvalidInputError
+            If the signature has another shape.
+        """
+        reference = np.asarray(signature)
+        if reference.shape not in ((SIGNATURE,), (SIGNATURE + 1,)):
+            raise InvalidInputError(f"a signature has the shape (242,) or (243,), not {reference.shape}")
+        flat_atom = float(reference[SIGNATURE]) if len(reference) > SIGNATURE else None
+        either_side = not self.oriented and self.axes == "surface"
+        zeta = np.empty(len(self), np.float32)
+        for places, rows, _ in self.iter_signatures(frame=frame, flat_atom=flat_atom):
+            zeta[places] = similarity(rows, reference, either_side=either_side)
+        return zeta
 
 
 def extract(

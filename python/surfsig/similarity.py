@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,10 @@ from surfsig._surfsig import GOOD, OPTIMAL
 from surfsig.errors import InvalidInputError
 
 FIELD = 121
-"""Numbers of one curvature field; a signature holds K's and then H's, each 11 x 11."""
+"""Numbers of one curvature field, on a grid of 11 x 11."""
+
+SIGNATURE = 2 * FIELD
+"""Numbers of a signature: K's field, then H's."""
 
 
 def similarity(a: ArrayLike, b: ArrayLike, *, either_side: bool = False) -> NDArray[np.float64] | float:
@@ -41,7 +44,7 @@ def similarity(a: ArrayLike, b: ArrayLike, *, either_side: bool = False) -> NDAr
     zeta = _zeta(np.einsum("...i,...i->...", v1, v2), _lengths(v1), _lengths(v2))
     if either_side:
         zeta = np.fmax(zeta, similarity(v1, flipped(v2)))
-    return zeta if zeta.ndim else float(zeta)
+    return zeta if np.ndim(zeta) else float(zeta)
 
 
 def similarity_matrix(a: ArrayLike, b: ArrayLike, *, either_side: bool = False) -> NDArray[np.float64]:
@@ -104,7 +107,7 @@ def _rows(signatures: ArrayLike) -> NDArray[np.float64]:
         rows = np.asarray(signatures, np.float64)
     except (TypeError, ValueError):
         raise InvalidInputError("signatures must be numbers") from None
-    if rows.ndim == 0 or rows.shape[-1] not in (2 * FIELD, 2 * FIELD + 1):
+    if rows.ndim == 0 or rows.shape[-1] not in (SIGNATURE, SIGNATURE + 1):
         raise InvalidInputError(f"signatures must have 242 or 243 columns, not the shape {rows.shape}")
     return rows
 
@@ -115,12 +118,10 @@ def _same_length(a: NDArray[np.float64], b: NDArray[np.float64]) -> None:
 
 
 def _lengths(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.sqrt(np.einsum("...i,...i->...", rows, rows))
+    return np.asarray(np.sqrt(np.einsum("...i,...i->...", rows, rows)))
 
 
-def _zeta(
-    dot: NDArray[np.float64], length1: NDArray[np.float64], length2: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _zeta(dot: Any, length1: NDArray[np.float64], length2: NDArray[np.float64]) -> NDArray[np.float64]:
     with np.errstate(invalid="ignore", divide="ignore"):
         # Equation (12); rounding must not lift it above 1.
-        return np.minimum(np.abs(dot) / (length1 * length2), 1.0)
+        return np.asarray(np.minimum(np.abs(dot) / (length1 * length2), 1.0), np.float64)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from surfsig import defaults
 from surfsig.cli.console import number, on_terminal, print_json, print_table, progress_bar, quantity
 from surfsig.cli.options import CLOUD, axes_option, json_option, position, threads_option
 
@@ -30,6 +29,12 @@ QUANTILES = (0.05, 0.5, 0.95)
 @click.option("--radius", type=float, required=True, help="Of the neighbourhood, in the file's unit.")
 @click.option("-o", "--output", type=CLOUD, required=True, help="A .ply, .npz or .parquet file.")
 @click.option("--signatures", is_flag=True, help="Write the signature of each point too (242 numbers).")
+@click.option(
+    "--like",
+    type=position,
+    metavar="X,Y,Z",
+    help="Write zeta, the similarity of each point's surface with the one at this position.",
+)
 @axes_option
 @click.option(
     "--at",
@@ -50,6 +55,7 @@ def extract_command(
     radius: float,
     output: Path,
     signatures: bool,
+    like: tuple[float, float, float] | None,
     axes: Axes,
     at: tuple[tuple[float, float, float], ...],
     voxel: float | None,
@@ -62,12 +68,14 @@ def extract_command(
 
     The output has the input's points and fields, and k1, k2, gaussian_curvature, mean_curvature (per unit of
     length; a bump seen from the sensor is positive), nx ny nz, direction_x _y _z (along k1), residual,
-    condition, count, status (0 is ok), linearity, planarity, scattering. NaN where there is no value.
+    condition, count, status (0 is ok), linearity, planarity, scattering; zeta with --like. NaN where there is
+    no value.
 
     \b
     Examples:
       surfsig extract scan.ply --radius 0.02 -o out.ply
       surfsig extract scan.pcd --radius 0.02 --signatures -o out.npz
+      surfsig extract scan.ply --radius 0.02 --like 0.1,0.2,0.9 -o alike.ply
       surfsig extract scan.xyz --radius 0.02 --at 0.1,0.2,0.9 --viewpoint 0,0,0 -o one.parquet
     """  # noqa: D301
     import numpy as np
@@ -96,11 +104,14 @@ def extract_command(
         )
     clock.append(time.perf_counter())
     status = result.status.copy()
+    columns = _columns(result, status)
+    if like is not None:
+        columns["zeta"] = _similarity_to(like, cloud, result, viewpoint)
     with progress_bar("writing", "points", shown=shown) as progress:
         write(
             output,
             cloud if not at and voxel is None else _part_of(cloud, result),
-            _columns(result, status),
+            columns,
             chunks=_signature_chunks(result, status) if signatures else None,
             notes={"radius": repr(radius), "axes": axes},
             progress=progress,
@@ -140,6 +151,28 @@ def _columns(result: Extraction, status: NDArray[np.uint8]) -> dict[str, ArrayLi
     return columns | {name: getattr(result, name) for name in ("linearity", "planarity", "scattering")}
 
 
+def _similarity_to(
+    place: tuple[float, float, float],
+    cloud: PointCloud,
+    result: Extraction,
+    viewpoint: tuple[float, float, float] | None,
+) -> NDArray[np.float32]:
+    """Compare all places with one, with a flat atom as long as the whole scan's noise asks for."""
+    import numpy as np
+
+    import surfsig
+
+    there = surfsig.extract(cloud, result.radius, axes=result.axes, at=[place], viewpoint=viewpoint)
+    typical = result if len(result) > 1 else there
+    noise, count = np.nanmedian(typical.residual), np.median(typical.count)
+    flat = surfsig.flat_atom_length(float(noise), result.radius, float(count))
+    signature, status = there.signatures(flat_atom=flat, return_status=True)
+    if np.isnan(signature).any():
+        why = surfsig.Status(int(status[0])).name.lower().replace("_", " ")
+        raise surfsig.InvalidInputError(f"--like: no signature at {','.join(map(number, place))}: {why}")
+    return result.similarity_to(signature[0])
+
+
 def _signature_chunks(result: Extraction, status: NDArray[np.uint8]) -> Chunks:
     """Make signatures when they are to be written; where there is none, that shows in `status`."""
     import numpy as np
@@ -147,9 +180,7 @@ def _signature_chunks(result: Extraction, status: NDArray[np.uint8]) -> Chunks:
     from surfsig.files import Chunks
 
     def blocks() -> Iterator[NDArray[np.float32]]:
-        for start in range(0, len(result), defaults.SIGNATURE_BLOCK):
-            places = np.arange(start, min(start + defaults.SIGNATURE_BLOCK, len(result)))
-            rows, status[places] = result.signatures(places, return_status=True)
+        for places, rows, status[places] in result.iter_signatures():
             yield rows
 
     return Chunks("signature", result.signatures([]).shape[1], np.float32, blocks())
