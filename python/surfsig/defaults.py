@@ -16,3 +16,6 @@ SIGNATURE_BLOCK = 65_536
 
 FLAT_ATOM_NOISES = 3.0
 """Length of the flat atom, in lengths of a signature of pure noise."""
+
+PAPER_SEEDS = 5
+"""Draws of noise and poses in the paper's reproduction: an odd number, so that one is in the middle."""

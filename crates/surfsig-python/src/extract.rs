@@ -122,7 +122,8 @@ fn to_arrays(py: Python<'_>, extraction: Extraction) -> PyResult<Bound<'_, PyDic
     arrays.set_item("residual", extraction.residual.into_pyarray(py))?;
     arrays.set_item("condition", extraction.condition.into_pyarray(py))?;
     arrays.set_item("count", extraction.count.into_pyarray(py))?;
-    arrays.set_item("status", extraction.status.into_pyarray(py))?;
+    let status: Vec<u8> = extraction.status.into_iter().map(|status| status as u8).collect();
+    arrays.set_item("status", status.into_pyarray(py))?;
     arrays.set_item("linearity", extraction.linearity.into_pyarray(py))?;
     arrays.set_item("planarity", extraction.planarity.into_pyarray(py))?;
     arrays.set_item("scattering", extraction.scattering.into_pyarray(py))?;

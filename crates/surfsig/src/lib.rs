@@ -17,7 +17,7 @@
 //! let radius = Radius::new(0.01)?;
 //! let found = extract(&PointCloud::new(&points), radius, &ExtractOptions::default())?;
 //! let [a, b] = [20 * 40 + 20, 1600 + 20 * 40 + 20];
-//! assert_eq!(found.status[a], Status::Ok as u8);
+//! assert_eq!(found.status[a], Status::Ok);
 //! assert!((found.k1[a] - 10.0).abs() < 0.1 && (found.k2[b] - 10.0).abs() < 0.1);
 //!
 //! let [wa, wb] = [a, b].map(|i| Frame::shared().signature(&found.paraboloid(i)).unwrap());

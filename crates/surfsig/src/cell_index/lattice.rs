@@ -6,16 +6,12 @@
 use crate::{Error, Radius};
 
 /// Cells per radius. More cells follow the ball more closely, and make rows that are too short for
-/// wide registers; three was the fastest at 50 to 2,000 neighbours.
-const CELLS_PER_RADIUS: f64 = 3.0;
-
-/// Cells along a row that queries which share their windows may span. Longer runs prepare less often,
-/// and look at more points that are in no ball.
-const RUN_CELLS: f64 = 1.5;
+/// wide registers; two was the fastest from 50 to 2,800 neighbours.
+const CELLS_PER_RADIUS: f64 = 2.0;
 
 /// Cells along a row before the next row begins. Offsets are float32 from the middle of the row, so
-/// this bounds their rounding: 32 cells are 11 radii, which is 5e-7 of a radius.
-const CELLS_PER_ROW: f64 = 64.0;
+/// this bounds their rounding: 24 cells are 12 radii, which is 5e-7 of a radius.
+const CELLS_PER_ROW: f64 = 48.0;
 
 /// Float64 can still tell neighbouring cells apart, with a thousandth of a cell to spare.
 const MAX_CELLS: f64 = (1_u64 << 43) as f64;
@@ -92,9 +88,10 @@ impl Lattice {
         (CELLS_PER_RADIUS as i64 + 1, 1)
     }
 
-    /// Longest extent along x of queries that share their windows.
+    /// Longest extent along x of queries that share their windows: a cell. Longer runs prepare less
+    /// often, and look at more points that are in no ball.
     #[inline]
-    pub fn block_extent(&self) -> f32 {
-        (RUN_CELLS * self.step) as f32
+    pub fn run_extent(&self) -> f32 {
+        self.step as f32
     }
 }

@@ -4,7 +4,7 @@ use super::Status;
 use crate::curvature::Paraboloid;
 use crate::fit::FitAxes;
 use crate::fit::paraboloid::Paraboloids;
-use std::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
+use rayon::prelude::*;
 
 /// Curvature and what belongs to it, one entry for each query, in the order of the queries.
 ///
@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
 ///     .collect();
 /// let found = extract(&PointCloud::new_f64(&points), Radius::new(0.008)?, &ExtractOptions::default())?;
 /// let middle = 30 * 60 + 30;
-/// assert_eq!(found.status[middle], Status::Ok as u8);
+/// assert_eq!(found.status[middle], Status::Ok);
 /// assert!((found.k1[middle] - 10.0).abs() < 0.02);
 /// assert!(found.k2[middle].abs() < 0.02);
 /// assert!(found.directions[middle][1].abs() < 1e-2);
@@ -49,8 +49,8 @@ pub struct Extraction {
     pub condition: Vec<f32>,
     /// Points in the ball, the query itself included where it is one of the cloud's.
     pub count: Vec<u32>,
-    /// [`Status`] as a number.
-    pub status: Vec<u8>,
+    /// What became of each query.
+    pub status: Vec<Status>,
     /// (l1 - l2) / l1 of the covariance's eigenvalues: 1 on a line.
     pub linearity: Vec<f32>,
     /// (l2 - l3) / l1: 1 on a plane.
@@ -95,60 +95,149 @@ impl Extraction {
     }
 }
 
-/// The columns while many threads write to them, each to its own entries, in any order.
-///
-/// Relaxed atomics are plain stores on every processor; they let the compiler see that no two
-/// threads race, without `unsafe` and without a copy of the result.
+/// The columns while threads write to them, in the order of the lattice: each thread then writes to
+/// memory of its own, one entry after the other.
 pub(super) struct Columns {
     radius: f64,
-    scalars: [Vec<AtomicU32>; 7],
-    normals: Vec<[AtomicU32; 3]>,
-    directions: Vec<[AtomicU32; 3]>,
-    coefficients: Vec<[AtomicU32; 6]>,
-    count: Vec<AtomicU32>,
-    status: Vec<AtomicU8>,
+    k1: Vec<f32>,
+    k2: Vec<f32>,
+    normals: Vec<[f32; 3]>,
+    directions: Vec<[f32; 3]>,
+    residual: Vec<f32>,
+    condition: Vec<f32>,
+    count: Vec<u32>,
+    status: Vec<Status>,
+    linearity: Vec<f32>,
+    planarity: Vec<f32>,
+    scattering: Vec<f32>,
+    coefficients: Vec<[f32; 6]>,
 }
 
-/// Places of the columns in `Columns::scalars`.
-const K1: usize = 0;
-const K2: usize = 1;
-const RESIDUAL: usize = 2;
-const CONDITION: usize = 3;
-const LINEARITY: usize = 4;
-const PLANARITY: usize = 5;
-const SCATTERING: usize = 6;
-
-fn nan() -> AtomicU32 {
-    AtomicU32::new(f32::NAN.to_bits())
-}
-
-fn store(cell: &AtomicU32, value: f64) {
-    cell.store((value as f32).to_bits(), Relaxed);
-}
-
-fn value(cell: AtomicU32) -> f32 {
-    f32::from_bits(cell.into_inner())
+/// Some neighbouring entries of the columns.
+pub(super) struct ColumnsPart<'a> {
+    radius: f64,
+    k1: &'a mut [f32],
+    k2: &'a mut [f32],
+    normals: &'a mut [[f32; 3]],
+    directions: &'a mut [[f32; 3]],
+    residual: &'a mut [f32],
+    condition: &'a mut [f32],
+    count: &'a mut [u32],
+    status: &'a mut [Status],
+    linearity: &'a mut [f32],
+    planarity: &'a mut [f32],
+    scattering: &'a mut [f32],
+    /// Empty in the surface's axes.
+    coefficients: &'a mut [[f32; 6]],
 }
 
 impl Columns {
-    /// Entries that nobody writes to are those of points that are not finite.
     pub fn new(len: usize, radius: f64, axes: FitAxes) -> Self {
-        let column = || (0..len).map(|_| nan()).collect();
-        let vectors = || (0..len).map(|_| [nan(), nan(), nan()]).collect();
+        let nan = || vec![f32::NAN; len];
         let fitted = if axes == FitAxes::Sensor { len } else { 0 };
         Self {
             radius,
-            scalars: std::array::from_fn(|_| column()),
-            normals: vectors(),
-            directions: vectors(),
-            coefficients: (0..fitted).map(|_| std::array::from_fn(|_| nan())).collect(),
-            count: (0..len).map(|_| AtomicU32::new(0)).collect(),
-            status: (0..len).map(|_| AtomicU8::new(Status::NotFinite as u8)).collect(),
+            k1: nan(),
+            k2: nan(),
+            normals: vec![[f32::NAN; 3]; len],
+            directions: vec![[f32::NAN; 3]; len],
+            residual: nan(),
+            condition: nan(),
+            count: vec![0; len],
+            status: vec![Status::NotFinite; len],
+            linearity: nan(),
+            planarity: nan(),
+            scattering: nan(),
+            coefficients: vec![[f32::NAN; 6]; fitted],
         }
     }
 
+    /// The columns cut into parts of `len` entries, the last of which may be shorter.
+    pub fn parts(&mut self, len: usize) -> Vec<ColumnsPart<'_>> {
+        let mut coefficients = self.coefficients.chunks_mut(len);
+        let mut scalars = [
+            &mut self.k1,
+            &mut self.k2,
+            &mut self.residual,
+            &mut self.condition,
+            &mut self.linearity,
+            &mut self.planarity,
+            &mut self.scattering,
+        ]
+        .map(|column| column.chunks_mut(len));
+        let vectors = self.normals.chunks_mut(len).zip(self.directions.chunks_mut(len));
+        let numbers = self.count.chunks_mut(len).zip(self.status.chunks_mut(len));
+        vectors
+            .zip(numbers)
+            .map(|((normals, directions), (count, status))| {
+                let [k1, k2, residual, condition, linearity, planarity, scattering] =
+                    scalars.each_mut().map(|column| column.next().expect("columns of one length"));
+                ColumnsPart {
+                    radius: self.radius,
+                    k1,
+                    k2,
+                    normals,
+                    directions,
+                    residual,
+                    condition,
+                    count,
+                    status,
+                    linearity,
+                    planarity,
+                    scattering,
+                    coefficients: coefficients.next().unwrap_or_default(),
+                }
+            })
+            .collect()
+    }
+
+    /// The entries in the order of the queries. `query_of_entry` names each entry's query; queries
+    /// without an entry are those of points that are not finite.
+    pub fn finish(self, queries: usize, query_of_entry: &[u32], axes: FitAxes, oriented: bool) -> Extraction {
+        const NOWHERE: u32 = u32::MAX;
+        let mut entries = vec![NOWHERE; queries];
+        for (entry, &query) in query_of_entry.iter().enumerate() {
+            entries[query as usize] = entry as u32;
+        }
+        // One column after the other, so that hardly more than one is there twice.
+        fn ordered<T: Copy + Send + Sync>(column: Vec<T>, entries: &[u32], missing: T) -> Vec<T> {
+            let at = |&entry: &u32| if entry == NOWHERE { missing } else { column[entry as usize] };
+            entries.par_iter().with_min_len(4096).map(at).collect()
+        }
+        let scalar = |column| ordered(column, &entries, f32::NAN);
+        let vector = |column| ordered(column, &entries, [f32::NAN; 3]);
+        let coefficients = match axes {
+            FitAxes::Surface => Vec::new(),
+            FitAxes::Sensor => ordered(self.coefficients, &entries, [f32::NAN; 6]),
+        };
+        Extraction {
+            radius: self.radius,
+            axes,
+            oriented,
+            k1: scalar(self.k1),
+            k2: scalar(self.k2),
+            normals: vector(self.normals),
+            directions: vector(self.directions),
+            residual: scalar(self.residual),
+            condition: scalar(self.condition),
+            count: ordered(self.count, &entries, 0),
+            status: ordered(self.status, &entries, Status::NotFinite),
+            linearity: scalar(self.linearity),
+            planarity: scalar(self.planarity),
+            scattering: scalar(self.scattering),
+            coefficients,
+        }
+    }
+}
+
+impl ColumnsPart<'_> {
+    /// Number of entries.
+    pub fn len(&self) -> usize {
+        self.k1.len()
+    }
+
     /// Writes one lane of a batch, which came in units of the radius.
-    pub fn write(&self, entry: usize, count: f64, fits: &Paraboloids, lane: usize) {
+    pub fn write(&mut self, entry: usize, count: f64, fits: &Paraboloids, lane: usize) {
         let r = self.radius;
         let status = if fits.too_few.get(lane) {
             Status::TooFewPoints
@@ -159,57 +248,33 @@ impl Columns {
         } else {
             Status::Ok
         };
-        self.status[entry].store(status as u8, Relaxed);
-        self.count[entry].store(count as u32, Relaxed);
+        self.status[entry] = status;
+        self.count[entry] = count as u32;
         let [l1, l2, l3] = fits.spread.map(|l| l.0[lane]);
-        store(&self.scalars[LINEARITY][entry], (l1 - l2) / l1);
-        store(&self.scalars[PLANARITY][entry], (l2 - l3) / l1);
-        store(&self.scalars[SCATTERING][entry], l3 / l1);
+        self.linearity[entry] = ((l1 - l2) / l1) as f32;
+        self.planarity[entry] = ((l2 - l3) / l1) as f32;
+        self.scattering[entry] = (l3 / l1) as f32;
         if fits.no_plane.get(lane) {
             return;
         }
-        for axis in 0..3 {
-            store(&self.normals[entry][axis], fits.principal.normal[axis].0[lane]);
-        }
+        self.normals[entry] = fits.principal.normal.map(|v| v.0[lane] as f32);
         if matches!(status, Status::TooFewPoints | Status::Degenerate) {
             return;
         }
-        store(&self.scalars[K1][entry], fits.principal.k1.0[lane] / r);
-        store(&self.scalars[K2][entry], fits.principal.k2.0[lane] / r);
-        store(&self.scalars[RESIDUAL][entry], fits.residual.0[lane] * r);
-        store(&self.scalars[CONDITION][entry], fits.condition.0[lane]);
-        for axis in 0..3 {
-            store(&self.directions[entry][axis], fits.principal.direction[axis].0[lane]);
-        }
-        if let Some(cells) = self.coefficients.get(entry) {
+        self.k1[entry] = (fits.principal.k1.0[lane] / r) as f32;
+        self.k2[entry] = (fits.principal.k2.0[lane] / r) as f32;
+        self.residual[entry] = (fits.residual.0[lane] * r) as f32;
+        self.condition[entry] = fits.condition.0[lane] as f32;
+        self.directions[entry] = fits.principal.direction.map(|v| v.0[lane] as f32);
+        if let Some(coefficients) = self.coefficients.get_mut(entry) {
             // Heights grow away from the sensor, and the normal points to it.
             let sign = if fits.principal.normal[2].0[lane] > 0.0 { -1.0 } else { 1.0 };
-            let units = [1.0 / r, 1.0 / r, 1.0, 1.0, 1.0 / r, r].map(|unit| sign * unit);
-            for (cell, (coefficient, unit)) in cells.iter().zip(fits.coefficients.iter().zip(units)) {
-                store(cell, coefficient.0[lane] * unit);
+            let units = [1.0 / r, 1.0 / r, 1.0, 1.0, 1.0 / r, r];
+            for (value, (coefficient, unit)) in
+                coefficients.iter_mut().zip(fits.coefficients.iter().zip(units))
+            {
+                *value = (sign * coefficient.0[lane] * unit) as f32;
             }
-        }
-    }
-
-    pub fn finish(self, axes: FitAxes, oriented: bool) -> Extraction {
-        let [k1, k2, residual, condition, linearity, planarity, scattering] =
-            self.scalars.map(|column| column.into_iter().map(value).collect());
-        Extraction {
-            radius: self.radius,
-            axes,
-            oriented,
-            k1,
-            k2,
-            normals: self.normals.into_iter().map(|v| v.map(value)).collect(),
-            directions: self.directions.into_iter().map(|v| v.map(value)).collect(),
-            residual,
-            condition,
-            count: self.count.into_iter().map(AtomicU32::into_inner).collect(),
-            status: self.status.into_iter().map(AtomicU8::into_inner).collect(),
-            linearity,
-            planarity,
-            scattering,
-            coefficients: self.coefficients.into_iter().map(|v| v.map(value)).collect(),
         }
     }
 }

@@ -19,8 +19,9 @@ use crate::moments::Moments;
 use crate::simd::InstructionSet;
 use crate::simd::lanes::{LANES, Lanes};
 use crate::{Error, PointCloud, Radius};
-use extraction::Columns;
+use extraction::{Columns, ColumnsPart};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Queries that one thread takes at a time, and after which it looks whether it should stop.
 const CHUNK: usize = 512;
@@ -57,7 +58,7 @@ pub struct ExtractOptions {
 /// use surfsig::{extract, ExtractOptions, PointCloud, Radius, Status};
 /// let line: Vec<[f32; 3]> = (0..9).map(|i| [i as f32, 0.0, 0.0]).collect();
 /// let found = extract(&PointCloud::new(&line), Radius::new(20.0)?, &ExtractOptions::default())?;
-/// assert_eq!(found.status[4], Status::Degenerate as u8);
+/// assert_eq!(found.status[4], Status::Degenerate);
 /// assert!(found.k1[4].is_nan() && found.linearity[4] == 1.0);
 /// # Ok::<(), surfsig::Error>(())
 /// ```
@@ -117,32 +118,28 @@ fn run(
     let index = CellIndex::new(cloud, radius)?;
     let elsewhere = queries.index(cloud, radius)?;
     let asked = elsewhere.as_ref().unwrap_or(&index);
-    let columns = Columns::new(queries.len(cloud), radius.get(), options.axes);
+    let mut columns = Columns::new(asked.len(), radius.get(), options.axes);
     let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
-    (0..asked.len().div_ceil(CHUNK)).into_par_iter().try_for_each_init(
-        || Worker::new(&index, asked, &columns, options, set),
-        |worker, chunk| {
+    let parts = columns.parts(CHUNK);
+    parts.into_par_iter().enumerate().try_for_each_init(
+        || Worker::new(&index, asked, options, set),
+        |worker, (chunk, mut part)| {
             if monitor.is_cancelled() {
                 return Err(Error::Cancelled);
             }
-            let ranks = chunk * CHUNK..((chunk + 1) * CHUNK).min(asked.len());
-            let len = ranks.len();
-            worker.extract(ranks);
-            monitor.add(len);
+            worker.extract(chunk * CHUNK, &mut part);
+            monitor.add(part.len());
             Ok(())
         },
     )?;
-    if monitor.is_cancelled() {
-        return Err(Error::Cancelled);
-    }
-    Ok(columns.finish(options.axes, options.viewpoint.is_some()))
+    let oriented = options.viewpoint.is_some();
+    Ok(columns.finish(queries.len(cloud), &asked.point_of_rank, options.axes, oriented))
 }
 
 /// One thread's share of the loop: gathers moments until a batch is full, fits it, writes it.
 struct Worker<'a> {
     walk: DirectWalk<'a>,
     asked: &'a CellIndex,
-    columns: &'a Columns,
     options: &'a ExtractOptions,
     set: InstructionSet,
     pending: Vec<Pending>,
@@ -154,6 +151,7 @@ struct Worker<'a> {
 struct Pending {
     key: RowKey,
     offset: [f32; 3],
+    /// Where its values belong in the thread's part of the columns.
     entry: usize,
 }
 
@@ -161,37 +159,45 @@ impl<'a> Worker<'a> {
     fn new(
         index: &'a CellIndex,
         asked: &'a CellIndex,
-        columns: &'a Columns,
         options: &'a ExtractOptions,
         set: InstructionSet,
     ) -> Self {
         let walk = DirectWalk::new(index, set);
         let (pending, moments) = (Vec::with_capacity(LANES), Vec::with_capacity(LANES));
-        Self { walk, asked, columns, options, set, pending, moments }
+        Self { walk, asked, options, set, pending, moments }
     }
 
-    fn extract(&mut self, ranks: std::ops::Range<usize>) {
+    /// Fills a part of the columns, whose first entry is the query of rank `first`.
+    fn extract(&mut self, first: usize, part: &mut ColumnsPart<'_>) {
         let rows = &self.asked.rows;
-        let mut rank = ranks.start;
+        let ranks = first..first + part.len();
+        let mut rank = first;
         let mut row = rows.partition_point(|row| row.end <= rank);
         while rank < ranks.end {
             let Row { key, end, .. } = rows[row];
             self.walk.enter_row(key);
             let end = end.min(ranks.end);
             while rank < end {
-                rank = self.extract_run(key, rank, end);
+                rank = self.extract_run(key, rank..end, first, part);
             }
             row += 1;
         }
-        self.fit_pending();
+        self.fit_pending(part);
     }
 
-    /// Takes the queries from `start` on that are close enough together to share their windows, and
-    /// returns where the next run begins.
-    fn extract_run(&mut self, key: RowKey, start: usize, end: usize) -> usize {
-        let CellIndex { x, y, z, lattice, point_of_rank, .. } = self.asked;
-        let last = x[start] + lattice.block_extent();
-        let length = x[start..end.min(start + RUN)].iter().take_while(|x| **x <= last).count();
+    /// Takes those of the first queries in `ranks` that are close enough together to share their
+    /// windows, and returns where the next run begins.
+    fn extract_run(
+        &mut self,
+        key: RowKey,
+        ranks: Range<usize>,
+        first: usize,
+        part: &mut ColumnsPart<'_>,
+    ) -> usize {
+        let CellIndex { x, y, z, lattice, .. } = self.asked;
+        let start = ranks.start;
+        let last = x[start] + lattice.run_extent();
+        let length = x[start..ranks.end.min(start + RUN)].iter().take_while(|x| **x <= last).count();
         let run = start..start + length;
         let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for rank in run.clone() {
@@ -203,9 +209,9 @@ impl<'a> Worker<'a> {
         self.walk.enter_run(low, high);
         for rank in run.clone() {
             let offset = [x[rank], y[rank], z[rank]];
-            self.pending.push(Pending { key, offset, entry: point_of_rank[rank] as usize });
+            self.pending.push(Pending { key, offset, entry: rank - first });
             self.moments.push(self.walk.moments::<f32>(offset));
-            if self.pending.len() == LANES && self.fit_pending() {
+            if self.pending.len() == LANES && self.fit_pending(part) {
                 // The walk went back to points of the batch.
                 self.walk.enter_row(key);
                 self.walk.enter_run(low, high);
@@ -215,7 +221,7 @@ impl<'a> Worker<'a> {
     }
 
     /// Fits and writes the pending queries; says whether the walk has moved for it.
-    fn fit_pending(&mut self) -> bool {
+    fn fit_pending(&mut self, part: &mut ColumnsPart<'_>) -> bool {
         if self.pending.is_empty() {
             return false;
         }
@@ -231,7 +237,7 @@ impl<'a> Worker<'a> {
             fits = self.fit();
         }
         for (lane, (query, moments)) in self.pending.iter().zip(&self.moments).enumerate() {
-            self.columns.write(query.entry, moments.sums[0], &fits, lane);
+            part.write(query.entry, moments.sums[0], &fits, lane);
         }
         self.pending.clear();
         self.moments.clear();

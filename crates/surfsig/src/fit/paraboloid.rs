@@ -26,7 +26,7 @@ pub enum FitAxes {
 pub(crate) const UNKNOWNS: usize = 6;
 
 /// A slope at the patch's centre that counts as none.
-const FLAT: f64 = 1e-6;
+const FLAT: f64 = 1e-5;
 
 /// Turns of the axes after which a patch has `not_converged`.
 const MAX_TURNS: usize = 25;

@@ -45,7 +45,7 @@ pub struct Frame {
     /// Singular values of F, descending, each with whether it belongs to the field of H.
     singular_values: Vec<(f64, bool)>,
     /// U S^-1 U^T, for each part.
-    inverse_root: [DMatrix<f64>; 8],
+    inverse_root: Vec<DMatrix<f64>>,
     table: OnceLock<Table>,
 }
 
@@ -66,18 +66,18 @@ impl Frame {
         let shapes = parameters.shapes();
         // Equal columns of F count as one, longer by the root of their number.
         let columns: Vec<[f64; ALPHA]> = shapes
-            .iter()
+            .par_iter()
             .map(|(shape, offsets)| {
                 let weight = (offsets.len() as f64).sqrt();
                 shape.curvature_fields(parameters.formula).map(|v| weight * v)
             })
             .collect();
-        let mut singular_values = Vec::with_capacity(ALPHA);
-        let decompositions = Part::ALL.map(|part| {
-            let (values, vectors) = decompose(&part, &columns);
-            singular_values.extend(values.iter().map(|&v| (v, part.mean)));
-            (values, vectors)
-        });
+        let decompositions: Vec<_> = Part::ALL.par_iter().map(|part| decompose(part, &columns)).collect();
+        let mut singular_values: Vec<(f64, bool)> = Part::ALL
+            .iter()
+            .zip(&decompositions)
+            .flat_map(|(part, (values, _))| values.iter().map(|&value| (value, part.mean)))
+            .collect();
         singular_values.sort_by(|a, b| b.0.total_cmp(&a.0));
         let (largest, smallest) = (singular_values[0].0, singular_values[ALPHA - 1].0);
         let rank = singular_values.iter().filter(|(v, _)| *v > RANK_TOLERANCE * largest).count();
@@ -85,11 +85,12 @@ impl Frame {
             let atoms = shapes.iter().map(|(_, offsets)| offsets.len()).sum();
             return Err(Error::NotAFrame { atoms, rank, dimension: ALPHA, smallest, largest });
         }
-        let inverse_root = decompositions.map(|(values, vectors)| {
+        let inverse = |(values, vectors): &(Vec<f64>, DMatrix<f64>)| {
             let scaled =
                 DMatrix::from_fn(vectors.nrows(), vectors.ncols(), |i, j| vectors[(i, j)] / values[j]);
             scaled * vectors.transpose()
-        });
+        };
+        let inverse_root = decompositions.iter().map(inverse).collect();
         Ok(Self { parameters, shapes, singular_values, inverse_root, table: OnceLock::new() })
     }
 

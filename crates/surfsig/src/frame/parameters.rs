@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::curvature::{GRID, MeanCurvatureFormula, Paraboloid, grid_coordinate};
+use rayon::prelude::*;
 
 /// A parameter's largest absolute value and its number of levels, end points included.
 ///
@@ -124,24 +125,15 @@ impl FrameParameters {
         let [quadratic, slope, mixed, offset] =
             [self.quadratic, self.slope, self.mixed, self.offset].map(|levels| levels.values());
         let places = sphere_heights();
-        let mut shapes = Vec::new();
-        for &a in &quadratic {
+        // Parallel over a alone, so that the atoms keep their order.
+        let shapes_of = |&a: &f64| {
+            let mut shapes = Vec::new();
             for &b in &quadratic {
                 for &c in &slope {
                     for &d in &slope {
                         for &e in &mixed {
                             let shape = Paraboloid { a, b, c, d, e, f: 0.0 };
-                            let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-                            for &(x, y, limit) in &places {
-                                let height = shape.height(x, y);
-                                low = low.max(-limit - height);
-                                high = high.min(limit - height);
-                                if low > high {
-                                    break;
-                                }
-                            }
-                            let inside: Vec<f64> =
-                                offset.iter().copied().filter(|f| (low..=high).contains(f)).collect();
+                            let inside = offsets_inside(&shape, &places, &offset);
                             if !inside.is_empty() {
                                 shapes.push((shape, inside));
                             }
@@ -149,9 +141,24 @@ impl FrameParameters {
                     }
                 }
             }
-        }
-        shapes
+            shapes
+        };
+        quadratic.par_iter().flat_map_iter(shapes_of).collect()
     }
+}
+
+/// The offsets with which a shape stays inside the sphere.
+fn offsets_inside(shape: &Paraboloid, places: &[(f64, f64, f64)], offsets: &[f64]) -> Vec<f64> {
+    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    for &(x, y, limit) in places {
+        let height = shape.height(x, y);
+        low = low.max(-limit - height);
+        high = high.min(limit - height);
+        if low > high {
+            return Vec::new();
+        }
+    }
+    offsets.iter().copied().filter(|f| (low..=high).contains(f)).collect()
 }
 
 /// For each place of the grid, the height at which the sphere of diameter sqrt(3) D about the patch's

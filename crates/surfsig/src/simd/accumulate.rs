@@ -7,13 +7,15 @@ use crate::moments::{MOMENTS, Scalar, slot};
 /// Lanes that the points are dealt to, one after the other, on every instruction set.
 const VIRTUAL_LANES: usize = 16;
 
-/// What each virtual lane has summed.
-type LaneSums<S> = [[S; VIRTUAL_LANES]; MOMENTS];
+const HALF: usize = VIRTUAL_LANES / 2;
+
+/// What the virtual lanes have summed, each with the one that is eight further.
+type LaneSums<S> = [[S; HALF]; MOMENTS];
 
 /// The sums over the first `len` points of the block. The slots beyond `len`, up to a multiple of 16,
 /// must be zero: they then add nothing.
 pub(crate) fn accumulate<S: Scalar>(set: InstructionSet, block: &Block, len: usize) -> [S; MOMENTS] {
-    let mut lanes = [[S::default(); VIRTUAL_LANES]; MOMENTS];
+    let mut lanes = [[S::default(); HALF]; MOMENTS];
     sum_lanes(set, block, len, &mut lanes);
     let mut sums = reduce_lanes(set, &lanes);
     sums[0] = S::from_f64(len as f64);
@@ -184,7 +186,12 @@ fn pass<S: Scalar, const WIDTH: usize, const TERMS: usize>(
             }
         }
         for (total, &slot) in totals.iter().zip(slots) {
-            lanes[slot][first..first + WIDTH].copy_from_slice(total);
+            let lanes = &mut lanes[slot];
+            for l in 0..WIDTH {
+                // The first to come to a place sets it, the second adds.
+                let place = (first + l) % HALF;
+                lanes[place] = if first + l < HALF { total[l] } else { lanes[place] + total[l] };
+            }
         }
     }
 }
@@ -213,13 +220,11 @@ fn mul<S: Scalar, const WIDTH: usize>(a: [S; WIDTH], b: [S; WIDTH]) -> [S; WIDTH
 fn reduce<S: Scalar>(lanes: &LaneSums<S>) -> [S; MOMENTS] {
     let mut sums = [S::default(); MOMENTS];
     for (sum, lanes) in sums.iter_mut().zip(lanes) {
-        let mut partial = *lanes;
-        for half in [8, 4, 2, 1] {
-            for l in 0..half {
-                partial[l] += partial[l + half];
-            }
+        let mut quarter = [S::default(); HALF / 2];
+        for l in 0..HALF / 2 {
+            quarter[l] = lanes[l] + lanes[l + HALF / 2];
         }
-        *sum = partial[0];
+        *sum = (quarter[0] + quarter[2]) + (quarter[1] + quarter[3]);
     }
     sums
 }
