@@ -15,7 +15,8 @@ def rotation(rng: np.random.Generator) -> Array:
     """Return a rotation, every one as likely as any other."""
     q, r = np.linalg.qr(rng.normal(size=(3, 3)))
     q *= np.sign(np.diag(r))
-    return q * np.sign(np.linalg.det(q))
+    turned: Array = q * np.sign(np.linalg.det(q))
+    return turned
 
 
 def turn(axis: int, degrees: float) -> Array:

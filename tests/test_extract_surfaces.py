@@ -91,7 +91,7 @@ def test_a_plane_has_no_curvature_in_any_orientation(seed: int) -> None:
     rng = np.random.default_rng(seed)
     turned = rotation(rng)
     for origin, dtype in ((np.zeros(3), np.float64), (UTM, np.float64), (np.zeros(3), np.float32)):
-        points = (plane().points(rng, RADIUS) @ turned.T + origin).astype(dtype)
+        points: Array = (plane().points(rng, RADIUS) @ turned.T + origin).astype(dtype)
         found = extract_at(points, origin, viewpoint=origin + turned[:, 2])
         assert found.status[0] == Status.OK
         assert max(abs(found.k1[0]), abs(found.k2[0])) * RADIUS < 1e-5

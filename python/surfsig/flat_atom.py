@@ -44,7 +44,7 @@ def mean_curvature_noise(noise: float, radius: float, count: float) -> float:
 
 
 def flat_atom_length(noise: float, radius: float, count: float, *, frame: Frame | None = None) -> float:
-    """Return the flat atom's length for scans of this noise: three signatures of pure noise.
+    """Return the flat atom's length for scans of this noise: a few signatures of pure noise.
 
     Surfaces can only be compared with flat atoms of one length. For an extraction `s`, a typical one is
     ``flat_atom_length(np.nanmedian(s.residual), s.radius, np.median(s.count))``.

@@ -240,6 +240,6 @@ def _random(report: Mapping[str, Any]) -> str:
         "vocabulary, where it has no signature. A ball of 10 mm, with the frame's patch left at 40 mm, "
         "mends both. It was tried because the 20 mm ball fell short, and is the only other size that "
         "was; with the patch halved too, cylinders of 24 and 38 mm have zeta 0.94. The flat atom's "
-        "length comes from the scanner's noise alone, before anything was compared."
+        "length comes from the scanner's noise alone, before any random pose was compared."
     )
     return _table(caption, head, rows) + f"<p>{escape(why)}</p>"

@@ -34,7 +34,7 @@ SHOWN_BY: Final = {2: 1, 3: 1, 4: 1, 5: 1, 6: 1, 7: 1, 16: 11, 18: 15, 19: 14}
 def flat_atom(ball: float, scanner: Scanner | None = None) -> float:
     """Length of the flat atom for fits in balls of a radius, from the scanner's data sheet alone.
 
-    Nothing measured enters, so it could be, and was, fixed before any similarity was looked at:
+    Nothing measured enters, so it was fixed before any random pose was compared:
 
     - A height has the variance
       s^2 = noise^2 + (rounding step)^2 / 12 + outlier rate * (outlier height)^2 / 3.

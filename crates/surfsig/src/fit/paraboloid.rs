@@ -26,16 +26,20 @@ pub enum FitAxes {
 pub(crate) const UNKNOWNS: usize = 6;
 
 /// A slope at the patch's centre that counts as none.
-const FLAT: f64 = 1e-5;
+const FLAT: f64 = 1e-6;
 
 /// Turns of the axes after which a patch has `not_converged`.
 const MAX_TURNS: usize = 25;
 
-/// Points whose second spread is below this share of the first lie on a line (variances).
-const LINE: f64 = 1e-7;
+/// Points whose second spread is below this share of the first lie on a line (variances): a strip 30
+/// times as long as wide, such as a single line of a lidar. Across it, float32 offsets alone would make
+/// curvatures of a thousandth of the inverse radius, and noise any curvature.
+const LINE: f64 = 1e-3;
 
-/// A pivot of the normal equations, relative to its diagonal, that rounding alone can make.
-const SINGULAR: f64 = 1e-10;
+/// A pivot of the normal equations, relative to its diagonal, below which they count as singular. The
+/// standard error of some coefficient is then a thousand times what the same points could give, and
+/// float32 offsets alone would show.
+const SINGULAR: f64 = 1e-6;
 
 /// Sums in f32 are trusted where the residual is above this share of the radius, ...
 const ROUGH_ENOUGH: f64 = 2e-3;
@@ -44,7 +48,7 @@ const ROUGH_ENOUGH: f64 = 2e-3;
 const WIDE_ENOUGH: f64 = 2.5e-3;
 
 /// ... and where the normal equations are this far from singular.
-const REGULAR_ENOUGH: f64 = 1e-4;
+const REGULAR_ENOUGH: f64 = 2e-2;
 
 /// What is fitted, and what is known about the sensor.
 pub(crate) struct Task<'a> {
