@@ -16,6 +16,7 @@ help: ## Say what there is to make
 
 demo: build ## Run the main job and draw it into demo/
 	$(BIN)/python examples/demo.py $(OUT)
+	$(BIN)/surfsig paper --out $(OUT)/paper
 
 test: build ## Run all tests: Rust, its doc examples, Python
 	cargo test --workspace --quiet

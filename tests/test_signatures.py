@@ -1,5 +1,7 @@
 """From points to signatures: both axes, units, sides, the flat atom, missing ones."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from surface_points import Array, cylinder, paraboloid, plane, rotation, rough_surface, sphere, turn
@@ -171,13 +173,42 @@ def test_beyond_the_vocabulary() -> None:
 
 
 def test_iter_signatures_equals_signatures(rough: Extraction) -> None:
-    whole = rough.signatures()
+    reproduction = Frame.reproduction()
     for block in (1, 7, 399, 400, 10_000):
-        parts = list(rough.iter_signatures(block=block))
-        assert [len(part) for part in parts[:-1]] == [block] * (len(parts) - 1)
-        np.testing.assert_array_equal(np.vstack(parts), whole)
-    printed = np.vstack(list(rough.iter_signatures(frame=Frame.reproduction(), block=100)))
-    np.testing.assert_array_equal(printed, rough.signatures(frame=Frame.reproduction()))
+        for frame, flat_atom in ((None, None), (reproduction, 0.2)):
+            whole, status = rough.signatures(frame=frame, flat_atom=flat_atom, return_status=True)
+            parts = list(rough.iter_signatures(frame=frame, flat_atom=flat_atom, block=block))
+            assert [part.start for part, _, _ in parts] == list(range(0, 400, block))
+            assert parts[-1][0].stop == 400
+            for places, rows, statuses in parts:
+                np.testing.assert_array_equal(rows, whole[places])
+                np.testing.assert_array_equal(statuses, status[places])
+
+
+def test_similarity_to_compares_every_place_with_one_signature(rough: Extraction) -> None:
+    reference = int(np.flatnonzero(rough.ok)[10])
+    for flat_atom in (None, 0.1):
+        w = rough.signatures(flat_atom=flat_atom)
+        zeta = rough.similarity_to(w[reference])
+        np.testing.assert_allclose(zeta, similarity(w, w[reference]), atol=1e-6)
+        assert zeta[reference] == pytest.approx(1)
+        np.testing.assert_array_equal(np.isnan(zeta), np.isnan(w[:, 0]))
+
+
+def test_similarity_to_takes_either_side_where_no_sensor_is_known() -> None:
+    points = rough_surface(80, count=300)
+    up, down = extract(points, 0.3), extract(points * [1, 1, -1], 0.3)
+    w = up.signatures()
+    there = np.flatnonzero(up.ok & down.ok & ~np.isnan(w[:, 0]))[::10]
+    for i in there:
+        np.testing.assert_allclose(up.similarity_to(w[i]), similarity(w, w[i], either_side=True), atol=1e-6)
+        assert down.similarity_to(w[i])[i] > 0.999
+
+
+@pytest.mark.parametrize("signature", [np.zeros(241), np.zeros((1, 242)), 5, "abc"], ids=repr)
+def test_similarity_to_what_is_no_signature(rough: Extraction, signature: Any) -> None:
+    with pytest.raises(InvalidInputError, match="signature"):
+        rough.similarity_to(signature)
 
 
 @pytest.mark.xfail(strict=True, reason="a negative block yields nothing, 0 is an error of range()")

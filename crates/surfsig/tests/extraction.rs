@@ -46,7 +46,7 @@ fn above() -> ExtractOptions {
 
 /// Every number of an extraction, as bits, query by query.
 fn bits(found: &Extraction, i: usize) -> Vec<u32> {
-    let mut row = vec![found.count[i], found.status[i].into()];
+    let mut row = vec![found.count[i], found.status[i] as u32];
     let scalars = [
         &found.k1,
         &found.k2,
@@ -103,7 +103,7 @@ fn a_sphere_has_its_curvature_at_any_origin_and_in_either_precision() {
                     let found =
                         extract_monitored(&cloud, radius(0.05), &queries, &options, &Monitor::default())
                             .unwrap();
-                    assert_eq!(found.status, [Status::Ok as u8]);
+                    assert_eq!(found.status, [Status::Ok]);
                     assert!(found.oriented);
                     for k in [found.k1[0], found.k2[0]] {
                         assert!((k - sign).abs() < 0.005, "{k} {sign} {axes:?}");
@@ -142,10 +142,7 @@ fn a_far_outlier_and_a_point_that_is_not_finite_change_no_bit() {
     for i in 0..2000 {
         assert_eq!(bits(&found, i), bits(&expected, i));
     }
-    assert_eq!(
-        found.status[2000..],
-        [Status::TooFewPoints, Status::NotFinite, Status::NotFinite].map(|s| s as u8)
-    );
+    assert_eq!(found.status[2000..], [Status::TooFewPoints, Status::NotFinite, Status::NotFinite]);
     assert_eq!(found.count[2000..], [1, 0, 0]);
     assert_eq!(CellIndex::new(&cloud, radius(0.2)).unwrap().len(), 2001);
 }

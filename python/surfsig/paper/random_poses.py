@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._surfsig import GOOD, OPTIMAL, Frame
+from ..defaults import FLAT_ATOM_NOISES
 from ..flat_atom import mean_curvature_noise
 from ..similarity import similarity_matrix
 from ..simulate import Scanner
@@ -42,9 +43,8 @@ def flat_atom(ball: float, scanner: Scanner | None = None) -> float:
       tilted surface there are fewer by the cosine, but their errors along the normal are smaller by it.
     - The fit's H then has the standard deviation 6.9 s / (r^2 sqrt(N)) (a paraboloid's theory). On a plane
       the signature is H times that of unit H: to first order nothing else is left of noise.
-    - Two planes' signatures make the angle atan(h1 / L) - atan(h2 / L), with normal h1, h2 of standard
-      deviation n and the flat atom L. It is within acos(0.9) in 99 of 100 pairs if
-      L = 2.576 sqrt(2) / acos(0.9) n = 8.1 n.
+    - The flat atom is so many times as long as that noise that 99 of 100 pairs of planes are at 0.9 or
+      above (`defaults.FLAT_ATOM_NOISES`).
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def flat_atom(ball: float, scanner: Scanner | None = None) -> float:
     count = np.pi * ball**2 / (scanner.column_step * scanner.pixel * scanner.sheet_step)
     k = np.array([mean_curvature_noise(np.sqrt(variance), ball, count)], np.float32)
     noise, _ = Frame.default().signatures_of_curvatures(k, k, side=SIDE)
-    return float(np.linalg.norm(noise) * 2.576 * np.sqrt(2.0) / np.arccos(OPTIMAL))
+    return float(np.linalg.norm(noise) * FLAT_ATOM_NOISES)
 
 
 @dataclass(frozen=True, eq=False)
