@@ -6,6 +6,17 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "GOOD",
+    "INSTRUCTION_SET",
+    "OPTIMAL",
+    "STATUS_NAMES",
+    "Frame",
+    "__version__",
+    "extract",
+    "voxel_representatives",
+]
+
 __version__: str
 STATUS_NAMES: list[str]
 INSTRUCTION_SET: str
@@ -32,10 +43,10 @@ class Frame:
     def __new__(
         cls,
         *,
-        quadratic: tuple[float, int] = (4.0, 21),
-        slope: tuple[float, int] = (1.0, 5),
-        mixed: tuple[float, int] = (4.0, 21),
-        offset: tuple[float, int] = (0.5, 9),
+        quadratic: tuple[float, int] | None = None,
+        slope: tuple[float, int] | None = None,
+        mixed: tuple[float, int] | None = None,
+        offset: tuple[float, int] | None = None,
         as_printed: bool = False,
     ) -> Frame: ...
     @staticmethod

@@ -209,7 +209,7 @@ class Extraction:
             yield places, rows, status
 
     def similarity_to(self, signature: ArrayLike, *, frame: Frame | None = None) -> FloatArray:
-        """Compare every place with one signature: where else is this surface?
+        """Compare every place with one signature, to see where else its surface is.
 
         Parameters
         ----------

@@ -101,7 +101,9 @@ fn watched<T: Send>(
                 Ok(result) => return result.map_err(to_python),
                 Err(RecvTimeoutError::Timeout) => report().inspect_err(|_| cancel())?,
                 Err(RecvTimeoutError::Disconnected) => {
-                    return Err(pyo3::exceptions::PyRuntimeError::new_err("the extraction's thread panicked"));
+                    return Err(pyo3::exceptions::PyRuntimeError::new_err(
+                        "the extraction's thread panicked",
+                    ));
                 }
             }
         }

@@ -13,9 +13,9 @@ use surfsig::{FrameParameters, Levels, MeanCurvatureFormula, Paraboloid, SIGNATU
 ///
 /// Parameters
 /// ----------
-/// quadratic, slope, mixed, offset : tuple of (float, int)
+/// quadratic, slope, mixed, offset : tuple of (float, int), optional
 ///     Largest absolute value and number of levels, end points included, of a and b, of c and d, of
-///     e, and of f in eq. (5). The defaults are table II's ranges.
+///     e, and of f in eq. (5); by default table II's ranges with 21, 5, 21 and 9 levels.
 /// as_printed : bool
 ///     Eq. (4) with the power 2, as the paper prints it, in place of 3/2.
 ///
@@ -73,20 +73,27 @@ fn paraboloid(surface: [f64; 6]) -> Paraboloid {
 #[pymethods]
 impl Frame {
     #[new]
-    #[pyo3(signature = (*, quadratic=(4.0, 21), slope=(1.0, 5), mixed=(4.0, 21), offset=(0.5, 9), as_printed=false))]
+    #[pyo3(signature = (*, quadratic=None, slope=None, mixed=None, offset=None, as_printed=false))]
     fn new(
         py: Python<'_>,
-        quadratic: (f64, usize),
-        slope: (f64, usize),
-        mixed: (f64, usize),
-        offset: (f64, usize),
+        quadratic: Option<(f64, usize)>,
+        slope: Option<(f64, usize)>,
+        mixed: Option<(f64, usize)>,
+        offset: Option<(f64, usize)>,
         as_printed: bool,
     ) -> PyResult<Self> {
-        let levels = |(max, count)| Levels { max, count };
-        let formula =
-            if as_printed { MeanCurvatureFormula::AsPrinted } else { MeanCurvatureFormula::Corrected };
-        let [quadratic, slope, mixed, offset] = [quadratic, slope, mixed, offset].map(levels);
-        Self::own(py, FrameParameters { quadratic, slope, mixed, offset, formula })
+        let default = FrameParameters::default();
+        let chosen = |given: Option<(f64, usize)>, default: Levels| {
+            given.map_or(default, |(max, count)| Levels { max, count })
+        };
+        let parameters = FrameParameters {
+            quadratic: chosen(quadratic, default.quadratic),
+            slope: chosen(slope, default.slope),
+            mixed: chosen(mixed, default.mixed),
+            offset: chosen(offset, default.offset),
+            formula: if as_printed { MeanCurvatureFormula::AsPrinted } else { default.formula },
+        };
+        Self::own(py, parameters)
     }
 
     /// The frame of the default parameters: table II, the power 3/2, 9,159 atoms. Made once.

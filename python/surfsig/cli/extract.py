@@ -180,7 +180,8 @@ def _signature_chunks(result: Extraction, status: NDArray[np.uint8]) -> Chunks:
     from surfsig.files import Chunks
 
     def blocks() -> Iterator[NDArray[np.float32]]:
-        for places, rows, status[places] in result.iter_signatures():
+        for places, rows, statuses in result.iter_signatures():
+            status[places] = statuses
             yield rows
 
     return Chunks("signature", result.signatures([]).shape[1], np.float32, blocks())
