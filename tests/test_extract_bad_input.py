@@ -38,18 +38,15 @@ def test_a_radius_out_of_range(points: Array) -> None:
         refused("radius must be", points, radius)
 
 
-@pytest.mark.xfail(strict=True, reason="float() overflows, and says so itself")
 def test_a_radius_too_large_for_a_float(points: Array) -> None:
     refused("radius must be", points, 10**400)
 
 
-@pytest.mark.xfail(strict=True, reason="the core's message speaks of the radius, and of numbers above 0")
 @pytest.mark.parametrize("voxel", [1e-300, 1e300, 1e-20])
 def test_a_voxel_out_of_range_is_called_a_voxel(points: Array, voxel: float) -> None:
     refused("voxel", points, RADIUS, voxel=voxel)
 
 
-@pytest.mark.xfail(strict=True, reason="1e-300 is a finite number above 0, and is printed with 300 zeros")
 @pytest.mark.parametrize("radius", [1e-300, 1e300])
 def test_a_radius_out_of_range_is_told_the_range(points: Array, radius: float) -> None:
     with pytest.raises(InvalidInputError) as caught:
@@ -117,12 +114,10 @@ def test_places_of_the_wrong_shape_or_type(points: Array, at: Any) -> None:
     refused("at", points, RADIUS, at=at)
 
 
-@pytest.mark.xfail(strict=True, reason="NumPy's own ValueError comes through")
 def test_places_whose_rows_differ_in_length(points: Array) -> None:
     refused("at", points, RADIUS, at=[[1, 2, 3], [4, 5]])
 
 
-@pytest.mark.xfail(strict=True, reason="2^64 - 1 becomes -1, the last point")
 def test_an_unsigned_index_beyond_int64_does_not_count_from_the_end(points: Array) -> None:
     refused("at: index", points, RADIUS, at=np.array([2**64 - 1], np.uint64))
 
@@ -151,7 +146,7 @@ def test_at_and_voxel_exclude_each_other(points: Array) -> None:
 
 
 def test_coordinates_beyond_the_lattice_are_an_error_that_names_them(points: Array) -> None:
-    refused("too small for a coordinate of 1000000", np.vstack([points, [[1e20, 0, 0]]]), RADIUS)
+    refused("too small for a coordinate of 1e20", np.vstack([points, [[1e20, 0, 0]]]), RADIUS)
     refused("too small for a coordinate", np.full((9, 3), 3.4e38, np.float32), RADIUS)
 
 
@@ -195,7 +190,6 @@ def test_an_array_that_is_read_only_is_read_and_left_alone(points: Array) -> Non
     np.testing.assert_array_equal(frozen, points)
 
 
-@pytest.mark.xfail(strict=True, reason="contiguous for NumPy, a TypeError for the core")
 def test_an_array_that_is_not_aligned(points: Array) -> None:
     buffer = b"\0" + points.tobytes()
     view = np.frombuffer(buffer, np.float64, offset=1).reshape(-1, 3)

@@ -121,7 +121,6 @@ def test_extractions_from_several_threads_do_not_mix() -> None:
 
 
 @pytest.mark.skipif(not hasattr(signal, "alarm"), reason="no fork here")
-@pytest.mark.xfail(strict=True, reason="the global pool's threads are not there: it waits for ever")
 def test_a_forked_child_can_extract_too() -> None:
     """As multiprocessing does by default on Linux before Python 3.14, and PyTorch's data loaders still."""
     script = """

@@ -58,7 +58,6 @@ def check_turned_and_moved(cloud: PointCloud, radius: float) -> None:
     assert np.median(np.einsum("ij,ij->i", found.normals[same], still.normals[same] @ turned.T)) > 0.999999
 
 
-@pytest.mark.xfail(strict=True, reason="98.8 %: float32 sums where |k| r is above 10, and strips")
 def test_a_sparse_lidar_scan_that_is_turned_and_moved_keeps_its_curvature(scan: Reader) -> None:
     check_turned_and_moved(scan("surfaces/lidar_sphere_1.xyz"), 0.5)
 

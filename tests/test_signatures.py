@@ -211,7 +211,6 @@ def test_similarity_to_what_is_no_signature(rough: Extraction, signature: Any) -
         rough.similarity_to(signature)
 
 
-@pytest.mark.xfail(strict=True, reason="a negative block yields nothing, 0 is an error of range()")
 @pytest.mark.parametrize("block", [0, -5])
 def test_iter_signatures_of_blocks_without_a_row(rough: Extraction, block: int) -> None:
     with pytest.raises(InvalidInputError, match="block"):

@@ -18,8 +18,9 @@ SIGNATURE_BLOCK = 65_536
 FLAT_ATOM_NOISES = 2.576 * math.sqrt(2.0) / math.acos(0.9)
 """Length of the flat atom, in lengths of a signature of pure noise: 8.1.
 
-The signatures of two planes, of noise n and flat atom L, make the angle atan(h1 / L) - atan(h2 / L) with normal
-h1, h2 of standard deviation n; with this length it is within acos(0.9), zeta 0.9 or more, in 99 of 100 pairs.
+The signatures of two planes, of noise n and flat atom L, make the angle atan(h1 / L) - atan(h2 / L) with
+normal h1, h2 of standard deviation n; with this length it is within acos(0.9), zeta 0.9 or more, in 99 of 100
+pairs.
 """
 
 PAPER_SEEDS = 5

@@ -20,6 +20,9 @@ from surfsig.similarity import SIGNATURE, similarity
 
 FloatArray = NDArray[np.float32]
 
+LENGTHS = (1e-18, 1e18)
+"""What a radius or voxel may be: beyond, its square leaves float32."""
+
 
 class Status(enum.IntEnum):
     """Why a point has the values that it has."""
@@ -201,6 +204,8 @@ class Extraction:
         ------
         Which places, their signatures (k, 242) or (k, 243), and their statuses (k,).
         """
+        if block < 1:
+            raise InvalidInputError(f"block must be 1 or more, not {block}")
         for start in range(0, len(self), block):
             places = slice(start, min(start + block, len(self)))
             rows, status = self.signatures(
@@ -323,10 +328,12 @@ def extract(
 def _positive(value: float, what: str) -> float:
     try:
         number = float(value)
-    except (TypeError, ValueError):
-        raise InvalidInputError(f"{what} must be a number, not {value!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidInputError(f"{what} must be a finite number, not {value!r:.40}") from None
     if not (np.isfinite(number) and number > 0):
         raise InvalidInputError(f"{what} must be a finite number above 0, not {number:g}")
+    if not LENGTHS[0] <= number <= LENGTHS[1]:
+        raise InvalidInputError(f"{what} must be from {LENGTHS[0]:g} to {LENGTHS[1]:g}, not {number:g}")
     return number
 
 
@@ -346,7 +353,10 @@ def _queries(
     at: ArrayLike, count: int
 ) -> tuple[NDArray[np.uint32] | NDArray[np.float64], NDArray[np.int64] | None]:
     """Return what the core takes, and the points' numbers where they are points."""
-    array = np.asarray(at)
+    try:
+        array = np.asarray(at)
+    except ValueError:
+        raise InvalidInputError("at must be places (m, 3); its rows differ in length") from None
     if array.ndim == 2:
         return coordinate_array(array, "at").astype(np.float64), None
     indices = _places(array, count).astype(np.int64)
@@ -368,6 +378,9 @@ def _places(at: ArrayLike | None, count: int) -> NDArray[np.int64]:
         raise InvalidInputError(
             f"at must be whole numbers (m,), a mask, or places (m, 3), not {array.dtype} {array.shape}"
         )
+    # Before unsigned numbers can wrap round.
+    if array.dtype.kind == "u" and array.max() >= count:
+        raise InvalidInputError(f"at: index {array.max()} is outside a cloud of {count} points")
     numbers = array.astype(np.int64)
     wrong = (numbers < -count) | (numbers >= count)
     if wrong.any():

@@ -43,7 +43,7 @@ def coordinate_array(points: ArrayLike, name: str = "points") -> NDArray[Any]:
     if array.ndim != 2 or array.shape[1] != 3:
         raise InvalidInputError(f"{name} must have the shape (n, 3), not {array.shape}")
     kept = np.float32 if np.can_cast(array.dtype, np.float32, "safe") else np.float64
-    return np.ascontiguousarray(array, dtype=kept)
+    return np.require(array, kept, ["C_CONTIGUOUS", "ALIGNED"])
 
 
 def position_array(values: ArrayLike, name: str) -> NDArray[np.float64]:

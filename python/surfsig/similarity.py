@@ -41,7 +41,11 @@ def similarity(a: ArrayLike, b: ArrayLike, *, either_side: bool = False) -> NDAr
     """
     v1, v2 = _rows(a), _rows(b)
     _same_length(v1, v2)
-    zeta = _zeta(np.einsum("...i,...i->...", v1, v2), _lengths(v1), _lengths(v2))
+    try:
+        dot = np.einsum("...i,...i->...", v1, v2)
+    except ValueError:
+        raise InvalidInputError(f"shapes {v1.shape} and {v2.shape} do not broadcast") from None
+    zeta = _zeta(dot, _lengths(v1), _lengths(v2))
     if either_side:
         zeta = np.fmax(zeta, similarity(v1, flipped(v2)))
     return zeta if np.ndim(zeta) else float(zeta)
@@ -68,6 +72,8 @@ def similarity_matrix(a: ArrayLike, b: ArrayLike, *, either_side: bool = False) 
     """
     v1, v2 = np.atleast_2d(_rows(a)), np.atleast_2d(_rows(b))
     _same_length(v1, v2)
+    if v1.ndim != 2 or v2.ndim != 2:
+        raise InvalidInputError(f"expected rows of signatures, not the shapes {v1.shape} and {v2.shape}")
     zeta = _zeta(v1 @ v2.T, _lengths(v1)[:, None], _lengths(v2)[None, :])
     return np.fmax(zeta, similarity_matrix(v1, flipped(v2))) if either_side else zeta
 

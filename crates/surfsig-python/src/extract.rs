@@ -1,6 +1,6 @@
 //! Extraction, watched from Python.
 
-use crate::to_python;
+use crate::{rows, to_python};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -22,17 +22,11 @@ pub enum Points<'py> {
 impl Points<'_> {
     fn cloud(&self, origin: [f64; 3]) -> PyResult<PointCloud<'_>> {
         let offsets = match self {
-            Self::F32(array) => Offsets::F32(rows(array)?),
-            Self::F64(array) => Offsets::F64(rows(array)?),
+            Self::F32(array) => Offsets::F32(rows::<f32, 3>(array)?),
+            Self::F64(array) => Offsets::F64(rows::<f64, 3>(array)?),
         };
         Ok(PointCloud { offsets, origin })
     }
-}
-
-fn rows<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<&'a [[T; 3]]> {
-    let (rows, rest) = array.as_slice()?.as_chunks::<3>();
-    let three_columns = rest.is_empty() && array.as_array().ncols() == 3;
-    three_columns.then_some(rows).ok_or_else(|| PyValueError::new_err("expected an array of shape (n, 3)"))
 }
 
 /// Places at which curvature is asked for.
@@ -61,7 +55,7 @@ pub fn extract<'py>(
     let queries = match &at {
         None => Queries::All,
         Some(At::Indices(indices)) => Queries::Indices(indices.as_slice()?),
-        Some(At::Positions(positions)) => Queries::Positions(PointCloud::new_f64(rows(positions)?)),
+        Some(At::Positions(positions)) => Queries::Positions(PointCloud::new_f64(rows::<f64, 3>(positions)?)),
     };
     let axes = match axes {
         "surface" => FitAxes::Surface,

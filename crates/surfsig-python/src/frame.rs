@@ -2,7 +2,6 @@
 
 use crate::to_python;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use surfsig::{FrameParameters, Levels, MeanCurvatureFormula, Paraboloid, SIGNATURE, Status};
 
@@ -44,7 +43,8 @@ impl Frame {
     }
 
     fn own(py: Python<'_>, parameters: FrameParameters) -> PyResult<Self> {
-        let frame = py.detach(|| surfsig::Frame::new(parameters)).map_err(to_python)?;
+        let make = || surfsig::with_threads(None, || surfsig::Frame::new(parameters));
+        let frame = py.detach(make).map_err(to_python)?.map_err(to_python)?;
         Ok(Self { frame: Held::Own(Box::new(frame)) })
     }
 }
@@ -59,10 +59,17 @@ fn rows<'py>(
 ) -> PyResult<Rows<'py>> {
     let mut rows = vec![[0.0; SIGNATURE]; len];
     let mut statuses = vec![Status::Ok; len];
-    py.detach(|| fill(&mut rows, &mut statuses));
+    py.detach(|| surfsig::with_threads(None, || fill(&mut rows, &mut statuses))).map_err(to_python)?;
     let numbers: Vec<u8> = statuses.into_iter().map(|status| status as u8).collect();
     let rows = PyArray1::from_vec(py, rows.into_flattened()).reshape([len, SIGNATURE])?;
     Ok((rows, numbers.into_pyarray(py)))
+}
+
+fn check_side(side: f64) -> PyResult<()> {
+    if side.is_finite() && side > 0.0 {
+        return Ok(());
+    }
+    Err(crate::invalid_input(&format!("side must be a finite number above 0, not {side:e}")))
 }
 
 fn paraboloid(surface: [f64; 6]) -> Paraboloid {
@@ -76,15 +83,16 @@ impl Frame {
     #[pyo3(signature = (*, quadratic=None, slope=None, mixed=None, offset=None, as_printed=false))]
     fn new(
         py: Python<'_>,
-        quadratic: Option<(f64, usize)>,
-        slope: Option<(f64, usize)>,
-        mixed: Option<(f64, usize)>,
-        offset: Option<(f64, usize)>,
+        quadratic: Option<(f64, i64)>,
+        slope: Option<(f64, i64)>,
+        mixed: Option<(f64, i64)>,
+        offset: Option<(f64, i64)>,
         as_printed: bool,
     ) -> PyResult<Self> {
         let default = FrameParameters::default();
-        let chosen = |given: Option<(f64, usize)>, default: Levels| {
-            given.map_or(default, |(max, count)| Levels { max, count })
+        let chosen = |given: Option<(f64, i64)>, default: Levels| {
+            // What is below 0 is refused like 0.
+            given.map_or(default, |(max, count)| Levels { max, count: count.max(0) as usize })
         };
         let parameters = FrameParameters {
             quadratic: chosen(quadratic, default.quadratic),
@@ -98,8 +106,9 @@ impl Frame {
 
     /// The frame of the default parameters: table II, the power 3/2, 9,159 atoms. Made once.
     #[staticmethod]
-    fn default(py: Python<'_>) -> Self {
-        Self { frame: Held::Shared(py.detach(surfsig::Frame::shared)) }
+    fn default(py: Python<'_>) -> PyResult<Self> {
+        let frame = py.detach(|| surfsig::with_threads(None, surfsig::Frame::shared)).map_err(to_python)?;
+        Ok(Self { frame: Held::Shared(frame) })
     }
 
     /// The frame of the paper's reproduction: table II, eq. (4) as printed, 3,109 atoms, smallest
@@ -144,8 +153,9 @@ impl Frame {
 
     /// Smallest eigenvalue of F F^T for patches of the given side, with curvature per unit of the
     /// side's own length; `side=1.0` gives it in patch units.
-    fn smallest_eigenvalue(&self, side: f64) -> f64 {
-        self.get().smallest_eigenvalue(side)
+    fn smallest_eigenvalue(&self, side: f64) -> PyResult<f64> {
+        check_side(side)?;
+        Ok(self.get().smallest_eigenvalue(side))
     }
 
     /// alpha, the curvature fields of a surface a, b, c, d, e, f in patch units: (242,) float64, K on
@@ -171,9 +181,10 @@ impl Frame {
         k2: PyReadonlyArray1<'py, f32>,
         side: f64,
     ) -> PyResult<Rows<'py>> {
+        check_side(side)?;
         let (k1, k2) = (k1.as_slice()?, k2.as_slice()?);
         if k1.len() != k2.len() {
-            return Err(PyValueError::new_err("k1 and k2 must have the same length"));
+            return Err(crate::invalid_input("k1 and k2 must have the same length"));
         }
         let curvatures: Vec<[f32; 2]> = k1.iter().zip(k2).map(|(k1, k2)| [*k1, *k2]).collect();
         rows(py, curvatures.len(), |rows, statuses| {
@@ -190,10 +201,8 @@ impl Frame {
         surfaces: PyReadonlyArray2<'py, f32>,
         side: f64,
     ) -> PyResult<Rows<'py>> {
-        let (surfaces, rest) = surfaces.as_slice()?.as_chunks::<6>();
-        if !rest.is_empty() {
-            return Err(PyValueError::new_err("expected an array of shape (m, 6)"));
-        }
+        let surfaces = crate::rows::<f32, 6>(&surfaces)?;
+        check_side(side)?;
         rows(py, surfaces.len(), |rows, statuses| {
             self.get().signatures_of_surfaces(side, surfaces, rows, statuses);
         })

@@ -3,18 +3,34 @@
 mod extract;
 mod frame;
 
+use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 
 /// The core's errors are mistakes that the caller can mend.
 fn to_python(error: surfsig::Error) -> PyErr {
+    invalid_input(&error.to_string())
+}
+
+/// A `surfsig.InvalidInputError`.
+fn invalid_input(message: &str) -> PyErr {
     Python::attach(|py| {
         let class = py.import("surfsig.errors").and_then(|module| module.getattr("InvalidInputError"));
-        match class.and_then(|class| class.call1((PyString::new(py, &error.to_string()),))) {
+        match class.and_then(|class| class.call1((PyString::new(py, message),))) {
             Ok(exception) => PyErr::from_value(exception),
             Err(failed) => failed,
         }
     })
+}
+
+/// The rows of an (n, N) array that stands row by row in memory.
+fn rows<'a, T: numpy::Element, const N: usize>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<&'a [[T; N]]> {
+    let wrong = || invalid_input(&format!("expected a C-contiguous array of shape (n, {N})"));
+    if !array.is_c_contiguous() || array.shape()[1] != N {
+        return Err(wrong());
+    }
+    let (rows, rest) = array.as_slice()?.as_chunks::<N>();
+    if rest.is_empty() { Ok(rows) } else { Err(wrong()) }
 }
 
 /// The compiled core of surfsig.

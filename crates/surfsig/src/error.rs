@@ -9,12 +9,12 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The radius is zero, negative, infinite or not a number.
-    #[error("radius must be a finite number above 0, not {0}")]
+    /// The radius is zero, negative, infinite, not a number, or of no use in float32.
+    #[error("a radius or voxel must be a finite number from 1e-18 to 1e18, not {0:e}")]
     InvalidRadius(f64),
     /// The lattice of a radius this small cannot be numbered at coordinates this large.
     #[error(
-        "radius {radius} is too small for a coordinate of {coordinate}: float64 cannot tell its cells apart"
+        "a radius or voxel of {radius:e} is too small for a coordinate of {coordinate:e}: float64 cannot tell its cells apart"
     )]
     RadiusBelowResolution {
         /// The radius that was asked for.

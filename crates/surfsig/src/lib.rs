@@ -39,6 +39,7 @@ mod moments;
 mod point_cloud;
 mod simd;
 mod similarity;
+mod threads;
 
 pub use cell_index::CellIndex;
 pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
@@ -52,3 +53,4 @@ pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use simd::InstructionSet;
 pub use similarity::{GOOD, OPTIMAL, SimilarityClass, similarity};
+pub use threads::with_threads;

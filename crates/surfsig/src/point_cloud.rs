@@ -126,11 +126,10 @@ impl Radius {
     /// Checks a length, in the cloud's own unit.
     ///
     /// # Errors
-    /// [`Error::InvalidRadius`] where it is 0, negative or not finite, or so small or large that its
-    /// square or its inverse is no normal number of float32.
+    /// [`Error::InvalidRadius`] where it is 0, negative or not finite, or outside 1e-18 to 1e18, beyond
+    /// which its square leaves float32.
     pub fn new(radius: f64) -> Result<Self, Error> {
-        // The kernels hold 1 / radius, and offsets of some radii, as float32.
-        let usable = (1e-30..=1e30).contains(&radius);
+        let usable = (1e-18..=1e18).contains(&radius);
         if usable { Ok(Self(radius)) } else { Err(Error::InvalidRadius(radius)) }
     }
 

@@ -53,7 +53,6 @@ fn singular_values_hold_all_of_the_reproductions_frame() {
 }
 
 #[test]
-#[ignore = "nalgebra's SVD stops early: two singular values of the default frame are 2.2e-6 off"]
 fn singular_values_hold_all_of_the_default_frame() {
     assert_parseval(Frame::shared());
 }

@@ -5,9 +5,12 @@ mod lattice;
 pub(crate) use lattice::{Lattice, RowKey};
 
 use crate::simd::select::PADDING;
-use crate::{Error, PointCloud, Radius};
+use crate::{Error, Monitor, PointCloud, Radius};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
+
+/// Points after which it is looked whether the caller asked to stop.
+const WATCH_INTERVAL: usize = 65_536;
 
 /// A row: its key, and where its points begin. They end where the next row's begin.
 #[derive(Debug, Clone, Copy)]
@@ -48,14 +51,16 @@ impl CellIndex {
     /// [`Error::RadiusBelowResolution`] where float64 cannot tell the lattice's cells apart at a
     /// point's coordinates; [`Error::TooManyPoints`] beyond 2^32 - 1 points.
     pub fn new(cloud: &PointCloud<'_>, radius: Radius) -> Result<Self, Error> {
-        Self::of_positions(cloud.len(), |i| cloud.position(i), radius)
+        Self::of_positions(cloud.len(), |i| cloud.position(i), radius, &Monitor::default())
     }
 
-    /// As [`CellIndex::new`], for positions that are computed; `None` is left out.
+    /// As [`CellIndex::new`], for positions that are computed, of which `None` is left out, and a caller
+    /// who may ask to stop.
     pub(crate) fn of_positions(
         len: usize,
         position: impl Fn(usize) -> Option<[f64; 3]> + Sync,
         radius: Radius,
+        monitor: &Monitor,
     ) -> Result<Self, Error> {
         const NOWHERE: u32 = u32::MAX;
         if len >= NOWHERE as usize {
@@ -69,6 +74,9 @@ impl CellIndex {
         let mut row_of_point = vec![NOWHERE; len];
         let mut last = None;
         for (i, row) in row_of_point.iter_mut().enumerate() {
+            if i % WATCH_INTERVAL == 0 {
+                monitor.check()?;
+            }
             let Some(p) = position(i) else { continue };
             let (key, _) = lattice.place(p)?;
             // Neighbours in a file are often neighbours in space.
@@ -117,7 +125,8 @@ impl CellIndex {
                 pr.split_off_mut(..split).expect("as many slots as points"),
             ));
         }
-        work.into_par_iter().with_min_len(16).for_each_init(Vec::new, |offsets, (x, y, z, ranks)| {
+        work.into_par_iter().with_min_len(16).try_for_each_init(Vec::new, |offsets, (x, y, z, ranks)| {
+            monitor.check()?;
             offsets.clear();
             offsets.extend(ranks.iter().map(|&i| {
                 let place = position(i as usize).map(|p| lattice.place(p));
@@ -128,7 +137,8 @@ impl CellIndex {
             for (slot, &(offset, i)) in offsets.iter().enumerate() {
                 ([x[slot], y[slot], z[slot]], ranks[slot]) = (offset, i);
             }
-        });
+            Ok(())
+        })?;
         Ok(Self { lattice, rows, row_of_key: met, x, y, z, point_of_rank })
     }
 

@@ -18,12 +18,13 @@ use crate::fit::tensor::MomentBatch;
 use crate::moments::Moments;
 use crate::simd::InstructionSet;
 use crate::simd::lanes::{LANES, Lanes};
+use crate::threads::with_threads;
 use crate::{Error, PointCloud, Radius};
 use extraction::{Columns, ColumnsPart};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Queries that one thread takes at a time, and after which it looks whether it should stop.
+/// Queries that one thread takes at a time.
 const CHUNK: usize = 512;
 
 /// Most queries that share their windows.
@@ -96,15 +97,7 @@ pub fn extract_monitored(
     options: &ExtractOptions,
     monitor: &Monitor,
 ) -> Result<Extraction, Error> {
-    let run = || run(cloud, radius, queries, options, monitor);
-    match options.threads {
-        None => run(),
-        Some(threads) => rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(|e| Error::Threads { threads, reason: e.to_string() })?
-            .install(run),
-    }
+    with_threads(options.threads, || run(cloud, radius, queries, options, monitor))?
 }
 
 fn run(
@@ -115,8 +108,8 @@ fn run(
     monitor: &Monitor,
 ) -> Result<Extraction, Error> {
     queries.check(cloud)?;
-    let index = CellIndex::new(cloud, radius)?;
-    let elsewhere = queries.index(cloud, radius)?;
+    let index = CellIndex::of_positions(cloud.len(), |i| cloud.position(i), radius, monitor)?;
+    let elsewhere = queries.index(cloud, radius, monitor)?;
     let asked = elsewhere.as_ref().unwrap_or(&index);
     let mut columns = Columns::new(asked.len(), radius.get(), options.axes);
     let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
@@ -124,10 +117,7 @@ fn run(
     parts.into_par_iter().enumerate().try_for_each_init(
         || Worker::new(&index, asked, options, set),
         |worker, (chunk, mut part)| {
-            if monitor.is_cancelled() {
-                return Err(Error::Cancelled);
-            }
-            worker.extract(chunk * CHUNK, &mut part);
+            worker.extract(chunk * CHUNK, &mut part, monitor)?;
             monitor.add(part.len());
             Ok(())
         },
@@ -168,7 +158,7 @@ impl<'a> Worker<'a> {
     }
 
     /// Fills a part of the columns, whose first entry is the query of rank `first`.
-    fn extract(&mut self, first: usize, part: &mut ColumnsPart<'_>) {
+    fn extract(&mut self, first: usize, part: &mut ColumnsPart<'_>, monitor: &Monitor) -> Result<(), Error> {
         let rows = &self.asked.rows;
         let ranks = first..first + part.len();
         let mut rank = first;
@@ -178,11 +168,13 @@ impl<'a> Worker<'a> {
             self.walk.enter_row(key);
             let end = end.min(ranks.end);
             while rank < end {
+                monitor.check()?;
                 rank = self.extract_run(key, rank..end, first, part);
             }
             row += 1;
         }
         self.fit_pending(part);
+        Ok(())
     }
 
     /// Takes those of the first queries in `ranks` that are close enough together to share their

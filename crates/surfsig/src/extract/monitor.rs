@@ -1,5 +1,6 @@
 //! How a caller watches an extraction, and stops it.
 
+use crate::Error;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 
 /// Shared with a running extraction: how far it is, and whether it should stop.
@@ -30,8 +31,9 @@ impl Monitor {
         self.cancelled.store(true, Relaxed);
     }
 
-    pub(crate) fn is_cancelled(&self) -> bool {
-        self.cancelled.load(Relaxed)
+    /// An error where the caller asked to stop.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        if self.cancelled.load(Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
     }
 
     pub(crate) fn add(&self, queries: usize) {

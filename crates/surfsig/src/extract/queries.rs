@@ -1,5 +1,6 @@
 //! Where curvature is asked for.
 
+use super::Monitor;
 use crate::cell_index::CellIndex;
 use crate::{Error, PointCloud, Radius};
 use rustc_hash::FxHashMap;
@@ -41,14 +42,22 @@ impl Queries<'_> {
     }
 
     /// The queries sorted into rows, or `None` where they are the cloud's points themselves.
-    pub(super) fn index(&self, cloud: &PointCloud<'_>, radius: Radius) -> Result<Option<CellIndex>, Error> {
+    pub(super) fn index(
+        &self,
+        cloud: &PointCloud<'_>,
+        radius: Radius,
+        monitor: &Monitor,
+    ) -> Result<Option<CellIndex>, Error> {
         match self {
             Self::All => Ok(None),
             Self::Indices(indices) => {
-                CellIndex::of_positions(indices.len(), |i| cloud.position(indices[i] as usize), radius)
-                    .map(Some)
+                let position = |i: usize| cloud.position(indices[i] as usize);
+                CellIndex::of_positions(indices.len(), position, radius, monitor).map(Some)
             }
-            Self::Positions(positions) => CellIndex::new(positions, radius).map(Some),
+            Self::Positions(positions) => {
+                let position = |i| positions.position(i);
+                CellIndex::of_positions(positions.len(), position, radius, monitor).map(Some)
+            }
         }
     }
 }

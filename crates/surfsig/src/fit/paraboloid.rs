@@ -47,8 +47,11 @@ const ROUGH_ENOUGH: f64 = 2e-3;
 /// ... where the points are this far from a line (variances), ...
 const WIDE_ENOUGH: f64 = 2.5e-3;
 
-/// ... and where the normal equations are this far from singular.
+/// ... where the normal equations are this far from singular, ...
 const REGULAR_ENOUGH: f64 = 2e-2;
+
+/// ... and where curvature is not more than this over the radius.
+const BLUNT_ENOUGH: f64 = 4.0;
 
 /// What is fitted, and what is known about the sensor.
 pub(crate) struct Task<'a> {
@@ -93,45 +96,30 @@ fn fit(task: &Task<'_>) -> Paraboloids {
     let line = eigenvalues[1].le(eigenvalues[0] * Lanes::splat(LINE));
     let no_plane = line | count.lt(Lanes::splat(3.0));
 
-    let (axes, solution, converged, away_from_sensor) = match task.axes {
+    let (axes, solution, converged, singular) = match task.axes {
         FitAxes::Sensor => {
             let axes = Axes::of_cloud();
             let solution = solve(&task.moments.along(&axes));
-            // The paper's z runs away from the sensor, unless a viewpoint says otherwise.
-            let upward = solution.normal(&axes);
-            let away = match task.to_sensor {
-                Some(to_sensor) => dot(&upward, &to_sensor).lt(Lanes::ZERO),
-                None => Mask::ALL,
-            };
-            (axes, solution, Mask::ALL, away)
+            let singular = solution.is_singular();
+            (axes, solution, Mask::ALL, singular)
         }
         FitAxes::Surface => {
-            let towards = match task.to_sensor {
-                Some(to_sensor) => to_sensor,
-                // No sensor: up, so that the answer is at least always the same.
-                None => upwards(&normal),
-            };
-            let backwards = dot(&normal, &towards).lt(Lanes::ZERO);
-            let w = inverted(&normal, backwards);
-            let start = Axes { u: longest, v: cross(&w, &longest), w };
-            let (axes, solution, converged) = turn_until_flat(task.moments, start, !(no_plane | too_few));
-            (axes, solution, converged, !Mask::ALL)
+            let start = Axes { u: longest, v: cross(&normal, &longest), w: normal };
+            turn_until_flat(task.moments, start, !(no_plane | too_few))
         }
     };
 
-    let normal_of_fit = solution.normal(&axes);
-    let singular = solution.smallest_pivot.lt(Lanes::splat(SINGULAR));
-    let unfitted = too_few | singular;
+    // The side is chosen when the axes are final: on the way they may turn past the sensor.
+    let upward = solution.normal(&axes);
+    let away_from_sensor = dot(&upward, &task.towards_sensor(&upward)).lt(Lanes::ZERO);
     let mut principal = principal_curvatures(&solution.coefficients, &axes, away_from_sensor);
     // Where no paraboloid is determined, the plane still is.
-    let plane_normal = match task.axes {
-        FitAxes::Surface => axes.w,
-        FitAxes::Sensor => inverted(&normal, dot(&normal, &normal_of_fit).lt(Lanes::ZERO)),
-    };
-    principal.normal = chosen(unfitted, &plane_normal, &principal.normal);
+    let plane_normal = inverted(&normal, dot(&normal, &task.towards_sensor(&normal)).lt(Lanes::ZERO));
+    principal.normal = chosen(too_few | singular, &plane_normal, &principal.normal);
     let rough = Lanes::splat(ROUGH_ENOUGH * ROUGH_ENOUGH).le(solution.residual_square);
     let wide = (eigenvalues[0] * Lanes::splat(WIDE_ENOUGH)).le(eigenvalues[1]);
     let regular = Lanes::splat(REGULAR_ENOUGH).le(solution.smallest_pivot);
+    let blunt = principal.k1.abs().max(principal.k2.abs()).le(Lanes::splat(BLUNT_ENOUGH));
     Paraboloids {
         principal,
         spread: eigenvalues,
@@ -142,7 +130,21 @@ fn fit(task: &Task<'_>) -> Paraboloids {
         too_few,
         singular,
         converged,
-        needs_f64: !(too_few | rough & wide & regular),
+        needs_f64: !(too_few | rough & wide & regular & blunt),
+    }
+}
+
+impl Task<'_> {
+    /// Towards the sensor, from what is known of it, for surfaces with these normals.
+    #[inline(always)]
+    fn towards_sensor(&self, normal: &Vector) -> Vector {
+        match (self.to_sensor, self.axes) {
+            (Some(to_sensor), _) => to_sensor,
+            // The paper's z runs away from the sensor.
+            (None, FitAxes::Sensor) => [Lanes::ZERO, Lanes::ZERO, -Lanes::ONE],
+            // No sensor: up, so that the answer is at least always the same.
+            (None, FitAxes::Surface) => upwards(normal),
+        }
     }
 }
 
@@ -161,12 +163,14 @@ fn upwards(normal: &Vector) -> Vector {
 /// Where the patch is large against the radius of curvature, full turns overshoot and diverge: the
 /// length of each turn is therefore the secant's, from the slopes before and after the last turn.
 #[inline(always)]
-fn turn_until_flat(moments: &MomentBatch, start: Axes, fittable: Mask) -> (Axes, Solution, Mask) {
+fn turn_until_flat(moments: &MomentBatch, start: Axes, fittable: Mask) -> (Axes, Solution, Mask, Mask) {
     let flat = Lanes::splat(FLAT * FLAT);
     let mut axes = start;
     let mut solution = solve(&moments.along(&axes));
     let mut damping = Lanes::ONE;
-    let mut active = fittable & flat.lt(solution.slope_square());
+    // Points that determine no paraboloid seem to, once rounding has tilted the axes.
+    let singular = solution.is_singular();
+    let mut active = fittable & !singular & flat.lt(solution.slope_square());
     for _ in 0..MAX_TURNS {
         if !active.any() {
             break;
@@ -188,7 +192,8 @@ fn turn_until_flat(moments: &MomentBatch, start: Axes, fittable: Mask) -> (Axes,
         active = active & flat.lt(solution.slope_square());
     }
     let converged = solution.slope_square().le(flat);
-    (axes, solution, converged)
+    let singular = singular | solution.is_singular();
+    (axes, solution, converged, singular)
 }
 
 /// The solution of one set of normal equations.
@@ -202,6 +207,11 @@ struct Solution {
 }
 
 impl Solution {
+    #[inline(always)]
+    fn is_singular(&self) -> Mask {
+        self.smallest_pivot.lt(Lanes::splat(SINGULAR))
+    }
+
     #[inline(always)]
     fn slope_square(&self) -> Lanes {
         let [_, _, c, d, _, _] = self.coefficients;

@@ -1,6 +1,7 @@
 //! The frame F of section II: its atoms, its check, and its inverse.
 
 mod parameters;
+mod singular;
 mod symmetry;
 mod table;
 
@@ -11,6 +12,7 @@ use crate::{Error, Status};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::sync::OnceLock;
+use singular::left_singular_vectors;
 use symmetry::Part;
 use table::Table;
 
@@ -304,7 +306,7 @@ fn fill<T: Sync>(
 /// Singular values, and left singular vectors as columns, of one part of F.
 fn decompose(part: &Part, columns: &[[f64; ALPHA]]) -> (Vec<f64>, DMatrix<f64>) {
     let dimension = part.dimension();
-    // F^T = Q R, and R has F's singular values; at least as many rows as columns, of zeros if need be.
+    // F^T = Q R, so F = R^T Q^T, and R^T has F's singular values and left vectors; at least as many rows as columns, of zeros if need be.
     let mut transposed = DMatrix::zeros(columns.len().max(dimension), dimension);
     for (row, column) in columns.iter().enumerate() {
         for (i, value) in part.project(column).into_iter().enumerate() {
@@ -312,7 +314,5 @@ fn decompose(part: &Part, columns: &[[f64; ALPHA]]) -> (Vec<f64>, DMatrix<f64>) 
         }
     }
     let r = transposed.qr().r();
-    let svd = r.svd(false, true);
-    let vectors = svd.v_t.expect("asked for").transpose();
-    (svd.singular_values.iter().copied().collect(), vectors)
+    left_singular_vectors(r.transpose())
 }

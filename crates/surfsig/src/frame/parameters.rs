@@ -28,6 +28,9 @@ impl Levels {
     }
 }
 
+/// Most shapes that are searched for a frame: 40 times those of table II.
+const MAX_SHAPES: usize = 10_000_000;
+
 /// What a frame is made from; the same parameters always give the same frame.
 ///
 /// All lengths are in patch units, divided by the patch's side D: the frame then serves every size
@@ -87,17 +90,23 @@ impl FrameParameters {
             ("offset", self.offset),
         ];
         for (name, Levels { max, count }) in ranges {
-            if !(max.is_finite() && max >= 0.0) {
+            if !(0.0..=1e3).contains(&max) {
                 return Err(Error::InvalidFrame(format!(
-                    "the range of {name} must be finite and not negative, not {max}"
+                    "the range of {name} must be from 0 to 1000, not {max:e}"
                 )));
             }
-            // Beyond, the atoms are more than any memory holds.
-            if !(1..=101).contains(&count) {
+            if !(1..=1001).contains(&count) {
                 return Err(Error::InvalidFrame(format!(
-                    "the levels of {name} must be 1 to 101, not {count}"
+                    "the levels of {name} must be 1 to 1001, not {count}"
                 )));
             }
+        }
+        // Beyond, the search takes minutes, and the atoms more than memory holds.
+        let shapes = self.quadratic.count.pow(2) * self.slope.count.pow(2) * self.mixed.count;
+        if shapes > MAX_SHAPES {
+            return Err(Error::InvalidFrame(format!(
+                "these levels make {shapes} shapes; at most {MAX_SHAPES} are searched"
+            )));
         }
         Ok(())
     }
