@@ -49,6 +49,13 @@ class Peer:
 PEERS = (
     Peer("pcl_normals", "PCL NormalEstimationOMP", "normal, surface variation", "curvature", "c++"),
     Peer(
+        "pcl_normals_unsorted",
+        "PCL NormalEstimationOMP, tree told not to sort",
+        "normal, surface variation",
+        "curvature",
+        "c++",
+    ),
+    Peer(
         "pcl_curvatures",
         "PCL PrincipalCurvatures",
         "spread of the neighbours' normals, normals given",

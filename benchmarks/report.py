@@ -116,6 +116,7 @@ def speed_targets(peers: Results) -> list[Row]:
     """Return the rows of the speeds; a target with several peers counts against the fastest of them."""
     targets = (
         ("Curvature: the faster of PCL's normals, jakteristics", 12, ("pcl_normals", "jakteristics")),
+        ("The same, PCL's tree told not to sort", 12, ("pcl_normals_unsorted", "jakteristics")),
         ("Curvature: Open3D's normals", 20, ("open3d_normals",)),
         ("With all 242 numbers: Open3D's FPFH", 50, ("open3d_fpfh",)),
     )

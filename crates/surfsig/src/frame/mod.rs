@@ -11,8 +11,8 @@ use crate::curvature::{ALPHA, Paraboloid};
 use crate::{Error, Status};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use std::sync::OnceLock;
 use singular::left_singular_vectors;
+use std::sync::OnceLock;
 use symmetry::Part;
 use table::Table;
 
