@@ -44,6 +44,46 @@ pub struct CellIndex {
     pub(crate) point_of_rank: Vec<u32>,
 }
 
+/// Row of a point that is in none.
+const NOWHERE: u32 = u32::MAX;
+
+/// The rows that one thread has met among its share of the points, in that order, with their points.
+struct RowsMet {
+    counts: Vec<(RowKey, usize)>,
+}
+
+impl RowsMet {
+    /// Fills in which of the rows met each point is in.
+    fn among(
+        rows: &mut [u32],
+        position: impl Fn(usize) -> Option<[f64; 3]>,
+        lattice: &Lattice,
+        monitor: &Monitor,
+    ) -> Result<Self, Error> {
+        let mut met: FxHashMap<RowKey, u32> = FxHashMap::default();
+        let mut counts: Vec<(RowKey, usize)> = Vec::new();
+        let mut last = None;
+        for (i, row) in rows.iter_mut().enumerate() {
+            if i % WATCH_INTERVAL == 0 {
+                monitor.check()?;
+            }
+            let Some(p) = position(i) else { continue };
+            let (key, _) = lattice.place(p)?;
+            // Neighbours in a file are often neighbours in space.
+            *row = match last {
+                Some((last_key, last_row)) if last_key == key => last_row,
+                _ => *met.entry(key).or_insert_with(|| {
+                    counts.push((key, 0));
+                    counts.len() as u32 - 1
+                }),
+            };
+            last = Some((key, *row));
+            counts[*row as usize].1 += 1;
+        }
+        Ok(Self { counts })
+    }
+}
+
 impl CellIndex {
     /// Sorts the finite points of a cloud for balls of one radius.
     ///
@@ -62,34 +102,40 @@ impl CellIndex {
         radius: Radius,
         monitor: &Monitor,
     ) -> Result<Self, Error> {
-        const NOWHERE: u32 = u32::MAX;
         if len >= NOWHERE as usize {
             return Err(Error::TooManyPoints(len));
         }
         let lattice = Lattice::new(radius);
 
-        // Which row each point is in; rows are numbered as they are met.
+        // Which row each point is in. Threads number the rows that they meet, each for itself.
+        let mut row_of_point = vec![NOWHERE; len];
+        let share = len.div_ceil(rayon::current_num_threads()).max(1);
+        let shares: Vec<RowsMet> = row_of_point
+            .par_chunks_mut(share)
+            .enumerate()
+            .map(|(number, rows)| RowsMet::among(rows, |i| position(number * share + i), &lattice, monitor))
+            .collect::<Result<_, Error>>()?;
         let mut met: FxHashMap<RowKey, u32> = FxHashMap::default();
         let mut keys: Vec<(RowKey, usize)> = Vec::new();
-        let mut row_of_point = vec![NOWHERE; len];
-        let mut last = None;
-        for (i, row) in row_of_point.iter_mut().enumerate() {
-            if i % WATCH_INTERVAL == 0 {
-                monitor.check()?;
+        let renumbered: Vec<Vec<u32>> = shares
+            .into_iter()
+            .map(|share| {
+                let number = |(key, count): (RowKey, usize)| {
+                    let row = *met.entry(key).or_insert_with(|| {
+                        keys.push((key, 0));
+                        keys.len() as u32 - 1
+                    });
+                    keys[row as usize].1 += count;
+                    row
+                };
+                share.counts.into_iter().map(number).collect()
+            })
+            .collect();
+        row_of_point.par_chunks_mut(share).zip(&renumbered).for_each(|(rows, renumbered)| {
+            for row in rows.iter_mut().filter(|row| **row != NOWHERE) {
+                *row = renumbered[*row as usize];
             }
-            let Some(p) = position(i) else { continue };
-            let (key, _) = lattice.place(p)?;
-            // Neighbours in a file are often neighbours in space.
-            *row = match last {
-                Some((last_key, last_row)) if last_key == key => last_row,
-                _ => *met.entry(key).or_insert_with(|| {
-                    keys.push((key, 0));
-                    keys.len() as u32 - 1
-                }),
-            };
-            last = Some((key, *row));
-            keys[*row as usize].1 += 1;
-        }
+        });
 
         // Rows in the order of their keys, which is that of the lattice.
         let mut order: Vec<u32> = (0..keys.len() as u32).collect();

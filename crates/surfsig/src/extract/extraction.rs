@@ -133,22 +133,23 @@ pub(super) struct ColumnsPart<'a> {
 
 impl Columns {
     pub fn new(len: usize, radius: f64, axes: FitAxes) -> Self {
-        let nan = || vec![f32::NAN; len];
+        // Zeros cost nothing until they are written over, and then in many threads at once.
+        let zeros = || vec![0.0; len];
         let fitted = if axes == FitAxes::Sensor { len } else { 0 };
         Self {
             radius,
-            k1: nan(),
-            k2: nan(),
-            normals: vec![[f32::NAN; 3]; len],
-            directions: vec![[f32::NAN; 3]; len],
-            residual: nan(),
-            condition: nan(),
+            k1: zeros(),
+            k2: zeros(),
+            normals: vec![[0.0; 3]; len],
+            directions: vec![[0.0; 3]; len],
+            residual: zeros(),
+            condition: zeros(),
             count: vec![0; len],
             status: vec![Status::NotFinite; len],
-            linearity: nan(),
-            planarity: nan(),
-            scattering: nan(),
-            coefficients: vec![[f32::NAN; 6]; fitted],
+            linearity: zeros(),
+            planarity: zeros(),
+            scattering: zeros(),
+            coefficients: vec![[0.0; 6]; fitted],
         }
     }
 
@@ -248,24 +249,21 @@ impl ColumnsPart<'_> {
         } else {
             Status::Ok
         };
+        let fitted = !matches!(status, Status::TooFewPoints | Status::Degenerate);
+        let curvature = |value: f64| if fitted { value as f32 } else { f32::NAN };
         self.status[entry] = status;
         self.count[entry] = count as u32;
         let [l1, l2, l3] = fits.spread.map(|l| l.0[lane]);
         self.linearity[entry] = ((l1 - l2) / l1) as f32;
         self.planarity[entry] = ((l2 - l3) / l1) as f32;
         self.scattering[entry] = (l3 / l1) as f32;
-        if fits.no_plane.get(lane) {
-            return;
-        }
-        self.normals[entry] = fits.principal.normal.map(|v| v.0[lane] as f32);
-        if matches!(status, Status::TooFewPoints | Status::Degenerate) {
-            return;
-        }
-        self.k1[entry] = (fits.principal.k1.0[lane] / r) as f32;
-        self.k2[entry] = (fits.principal.k2.0[lane] / r) as f32;
-        self.residual[entry] = (fits.residual.0[lane] * r) as f32;
-        self.condition[entry] = fits.condition.0[lane] as f32;
-        self.directions[entry] = fits.principal.direction.map(|v| v.0[lane] as f32);
+        let plane = !fits.no_plane.get(lane);
+        self.normals[entry] = fits.principal.normal.map(|v| if plane { v.0[lane] as f32 } else { f32::NAN });
+        self.k1[entry] = curvature(fits.principal.k1.0[lane] / r);
+        self.k2[entry] = curvature(fits.principal.k2.0[lane] / r);
+        self.residual[entry] = curvature(fits.residual.0[lane] * r);
+        self.condition[entry] = curvature(fits.condition.0[lane]);
+        self.directions[entry] = fits.principal.direction.map(|v| curvature(v.0[lane]));
         if let Some(coefficients) = self.coefficients.get_mut(entry) {
             // Heights grow away from the sensor, and the normal points to it.
             let sign = if fits.principal.normal[2].0[lane] > 0.0 { -1.0 } else { 1.0 };
@@ -273,7 +271,7 @@ impl ColumnsPart<'_> {
             for (value, (coefficient, unit)) in
                 coefficients.iter_mut().zip(fits.coefficients.iter().zip(units))
             {
-                *value = (sign * coefficient.0[lane] * unit) as f32;
+                *value = curvature(sign * coefficient.0[lane] * unit);
             }
         }
     }
