@@ -53,7 +53,7 @@ def main(folder: Path) -> None:
     columns: dict[str, ArrayLike] = {"k1": s.k1, "k2": s.k2, "mean_curvature": s.mean_curvature}
     columns |= {"zeta": zeta, "normals": s.normals}
     surfsig.write(cloud_file, cloud, columns)
-    print(f"\npicture:      {picture}\npoint cloud:  {cloud_file}   (CloudCompare shows its scalar fields)")
+    print(f"\npicture:      {picture}\npoint cloud:  {cloud_file}   (CloudCompare offers its scalar fields)")
 
 
 def _radius(curvature: float) -> str:
