@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from surface_points import Array, rotation
 
-from surfsig import Extraction, InvalidInputError, Status, extract
+from surfsig import Extraction, InvalidInputError, Status, _surfsig, extract
 
 TILT = rotation(np.random.default_rng(31))
 NORMAL: Array = TILT[:, 2] * np.sign(TILT[2, 2])
@@ -281,3 +281,7 @@ def test_an_edge_does_not_settle_and_keeps_its_last_values() -> None:
     assert np.isfinite(found.k1[restless]).all()
     np.testing.assert_allclose(np.linalg.norm(found.normals[restless], axis=1), 1, atol=1e-5)
     assert (found.k1 >= found.k2).all()
+
+
+def test_the_statuses_are_those_of_the_core() -> None:
+    assert [status.name.lower() for status in Status] == _surfsig.STATUS_NAMES

@@ -58,6 +58,8 @@ pub(crate) struct DirectWalk<'a> {
     index: &'a CellIndex,
     set: InstructionSet,
     scale: f32,
+    /// The present row, so that coming back to it costs nothing.
+    row: Option<RowKey>,
     near: Vec<NearRow>,
     /// What the present run's balls may reach.
     windows: Vec<Window>,
@@ -67,7 +69,15 @@ pub(crate) struct DirectWalk<'a> {
 impl<'a> DirectWalk<'a> {
     pub fn new(index: &'a CellIndex, set: InstructionSet) -> Self {
         let scale = (1.0 / index.lattice.radius) as f32;
-        Self { index, set, scale, near: Vec::new(), windows: Vec::new(), block: Box::new(Block::new()) }
+        Self {
+            index,
+            set,
+            scale,
+            row: None,
+            near: Vec::new(),
+            windows: Vec::new(),
+            block: Box::new(Block::new()),
+        }
     }
 
     /// Shows a visitor the members of the ball around the query at this offset.
@@ -107,6 +117,9 @@ impl<'a> DirectWalk<'a> {
 
 impl MomentSource for DirectWalk<'_> {
     fn enter_row(&mut self, key: RowKey) {
+        if self.row.replace(key) == Some(key) {
+            return;
+        }
         self.near.clear();
         let (reach, reach_along_row) = self.index.lattice.reach();
         for dz in -reach..=reach {

@@ -13,7 +13,7 @@ pub use status::Status;
 use crate::ball::{DirectWalk, MomentSource};
 use crate::cell_index::{CellIndex, Row, RowKey};
 use crate::fit::FitAxes;
-use crate::fit::paraboloid::{Task, fit_paraboloids};
+use crate::fit::paraboloid::{Paraboloids, Task, fit_paraboloids};
 use crate::fit::tensor::MomentBatch;
 use crate::moments::Moments;
 use crate::simd::InstructionSet;
@@ -236,7 +236,7 @@ impl<'a> Worker<'a> {
         !again.is_empty()
     }
 
-    fn fit(&self) -> crate::fit::paraboloid::Paraboloids {
+    fn fit(&self) -> Paraboloids {
         let batch = MomentBatch::new(&self.moments);
         let to_sensor = self.options.viewpoint.map(|viewpoint| {
             [0, 1, 2].map(|axis| {

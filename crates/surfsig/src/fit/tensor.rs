@@ -186,7 +186,7 @@ mod tests {
         let w = [0.48, -0.6, 0.64];
         let axes = Axes::of_cloud().tilted_to(&w.map(Lanes::splat));
         let rows = [axes.u, axes.v, axes.w].map(|a| a.map(|c| c.0[3]));
-        let turned = Moments::<f64>::of_points(&points).rotated(&rows).scaled(1.0);
+        let turned = Moments::<f64>::of_points(&points).rotated(&rows);
         let patch = MomentBatch::new(&[Moments::of_points(&points); LANES]).along(&axes);
         let expect = |value: Lanes, i, j, k| {
             let expected = turned.get(i, j, k) / 40.0;
