@@ -35,12 +35,13 @@ def volume() -> Array:
 
 def test_progress_rises_to_the_total(volume: Array) -> None:
     seen: list[tuple[int, int]] = []
-    extract(volume, 0.12, at=np.arange(60_000), progress=lambda done, total: seen.append((done, total)))
+    extract(volume, 0.12, threads=1, progress=lambda done, total: seen.append((done, total)))
     done = [d for d, _ in seen]
-    assert {total for _, total in seen} == {60_000}
+    assert {total for _, total in seen} == {200_000}
     assert done == sorted(done)
-    assert done[-1] == 60_000
-    assert len(seen) > 2
+    assert done[-1] == 200_000
+    # One report at the end, and one at least on the way, which takes several times their interval.
+    assert len(seen) >= 2
 
 
 def test_progress_of_nothing() -> None:
