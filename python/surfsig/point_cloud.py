@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -71,6 +71,9 @@ class PointCloud:
         (3,) float64, added to the offsets; zeros by default.
     viewpoint
         (3,) float64, where the sensor stood, in true coordinates; None where nobody said.
+    viewpoints
+        (s, 3) float64, of a cloud that was joined from several scans: where the sensor stood for each; a
+        point's own is the one that its field ``scan`` numbers, from 0. None for any other cloud.
     fields
         Further values per point, (n,) or (n, k), by name and in the file's order. Colours are ``red``,
         ``green``, ``blue`` (and ``alpha``), uint8.
@@ -88,6 +91,7 @@ class PointCloud:
     viewpoint: NDArray[np.float64] | None = None
     fields: dict[str, NDArray[Any]] = field(default_factory=dict)
     grid: tuple[int, int] | None = None
+    viewpoints: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         self.offsets = coordinate_array(self.offsets)
@@ -103,6 +107,13 @@ class PointCloud:
                 )
             if values.dtype.kind not in "fiub":
                 raise InvalidInputError(f"field '{name}' must hold real numbers, not {values.dtype}")
+        if self.viewpoints is not None:
+            self.viewpoints = coordinate_array(self.viewpoints, "viewpoints").astype(np.float64)
+            scan = self.fields.get("scan")
+            if scan is None or scan.ndim != 1 or scan.dtype.kind not in "iu":
+                raise InvalidInputError("viewpoints need a field 'scan' of whole numbers (n,)")
+            if len(scan) and not (0 <= int(scan.min()) and int(scan.max()) < len(self.viewpoints)):
+                raise InvalidInputError(f"field 'scan' must be 0 to {len(self.viewpoints) - 1}")
         if self.grid is not None:
             height, width = (int(side) for side in self.grid)
             if height < 0 or width < 0 or height * width != len(self):
@@ -117,6 +128,23 @@ class PointCloud:
     def points(self) -> NDArray[Any]:
         """(n, 3) true coordinates: the offsets themselves where the origin is 0, else float64."""
         return self.origin + self.offsets if self.origin.any() else self.offsets
+
+    def at(self, indices: ArrayLike) -> PointCloud:
+        """Give some of the points with their fields.
+
+        Parameters
+        ----------
+        indices
+            Whole numbers (m,), or a mask (n,).
+
+        Returns
+        -------
+        PointCloud
+            A list of points, even where the whole was organised.
+        """
+        chosen = np.asarray(indices)
+        fields = {name: values[chosen] for name, values in self.fields.items()}
+        return replace(self, offsets=self.offsets[chosen], fields=fields, grid=None)
 
     @property
     def finite(self) -> NDArray[np.bool_]:

@@ -17,19 +17,44 @@ from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files import formats
 from surfsig.files.atomic import check_target, replacing
 from surfsig.files.columns import Chunks, output_columns
+from surfsig.files.options import box_array, cropped, in_metres, metres_per
 from surfsig.files.progress import Progress, ProgressCallback
 from surfsig.point_cloud import PointCloud
 
 __all__ = ["Chunks", "check_writable", "format_name", "read", "write"]
 
 
-def read(path: str | os.PathLike[str], *, progress: ProgressCallback | None = None) -> PointCloud:
+def read(
+    path: str | os.PathLike[str],
+    *,
+    box: ArrayLike | None = None,
+    unit: str | None = None,
+    scan: int | None = None,
+    samples: int | None = None,
+    intrinsics: ArrayLike | None = None,
+    depth_scale: float | None = None,
+    progress: ProgressCallback | None = None,
+) -> PointCloud:
     """Read a point cloud: PLY, PCD, text (XYZ, CSV, TXT, ASC), NPY, NPZ or Parquet.
 
     Parameters
     ----------
     path
         The file; its content, not its extension, decides how it is read.
+    box
+        Only the points in this box: (2, 3), its lowest and its highest corner, in the file's coordinates and
+        unit; both belong to it. A COPC file is read no further than the box asks for.
+    unit
+        What the file's numbers are: "mm", "cm", "m", "km", "in", "ft" or "us-ft". The cloud is then in
+        metres; by default it stays as it is.
+    scan
+        Of an E57 file with several scans, the one with this number, from 0; by default all of them.
+    samples
+        Of a mesh (OBJ, STL), this many points spread evenly over its surface, in place of its vertices.
+    intrinsics
+        Of a depth image: (fx, fy, cx, cy) in pixels.
+    depth_scale
+        Of a depth image: units of its numbers per unit of length; 1000 by default (millimetres to metres).
     progress
         Called with the bytes read so far and the size of the file.
 
@@ -44,6 +69,8 @@ def read(path: str | os.PathLike[str], *, progress: ProgressCallback | None = No
         If the file is missing, a folder, or cannot be opened.
     FileFormatError
         If it is no point cloud, broken, or cut off.
+    InvalidInputError
+        If an option has no meaning, or none for this file's format.
 
     Warns
     -----
@@ -52,13 +79,32 @@ def read(path: str | os.PathLike[str], *, progress: ProgressCallback | None = No
         no numbers.
     """
     path = Path(path)
+    corners = None if box is None else box_array(box)
+    metres = None if unit is None else metres_per(unit)
+    options = {
+        "scan": scan, "samples": samples, "intrinsics": intrinsics, "depth_scale": depth_scale,
+    }  # fmt: skip
+    given = {name: value for name, value in options.items() if value is not None}
     with path.open("rb") as file:
-        _, reader = formats.of_content(path, file.read(formats.HEAD_BYTES))
+        kind, reader = formats.of_content(path, file.read(formats.HEAD_BYTES))
+        for name in given:
+            if name not in kind.takes:
+                raise InvalidInputError(f"{path}: holds {kind.name} data, for which '{name}' means nothing")
+        if corners is not None and "box" in kind.takes:
+            given["box"] = corners
         file.seek(0)
         try:
-            return reader(file, str(path), Progress(progress, os.fstat(file.fileno()).st_size))
-        except (MemoryError, InvalidInputError) as error:
+            cloud = reader(file, str(path), Progress(progress, os.fstat(file.fileno()).st_size), **given)
+        except MemoryError as error:
             raise FileFormatError(f"{path}: {error or 'too large for the memory'}") from error
+        except InvalidInputError as error:
+            # With options the caller may be wrong, without any only the file can be.
+            if given:
+                raise
+            raise FileFormatError(f"{path}: {error}") from error
+    if corners is not None:
+        cloud = cropped(cloud, corners)
+    return cloud if metres is None else in_metres(cloud, metres)
 
 
 def format_name(path: str | os.PathLike[str]) -> str:

@@ -19,8 +19,8 @@ from surfsig.point_cloud import PointCloud
 HEAD_BYTES = 4096
 
 
-# Reads from an open file with a name (for messages).
-Reader = Callable[[BinaryIO, str, Progress], PointCloud]
+# Reads from an open file with a name (for messages); the options that the format takes come by keyword.
+Reader = Callable[..., PointCloud]
 
 
 class Writer(Protocol):
@@ -59,6 +59,8 @@ class Format:
         Raises where the format cannot be used here (a library is missing).
     reserved
         Names that a column cannot have.
+    takes
+        The options of `surfsig.read` that mean something to this format's reader.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Format:
     write: Writer | None = None
     check: Callable[[], None] = lambda: None
     reserved: tuple[str, ...] = ("x", "y", "z")
+    takes: tuple[str, ...] = ()
 
 
 def _begins(*marks: bytes) -> Callable[[bytes], bool]:

@@ -1,0 +1,60 @@
+"""What a caller may ask of any file: a part of it, and another unit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfsig.errors import InvalidInputError
+from surfsig.point_cloud import PointCloud
+
+UNITS = {
+    "mm": 0.001, "cm": 0.01, "m": 1.0, "km": 1000.0, "in": 0.0254, "ft": 0.3048, "us-ft": 1200 / 3937,
+}  # fmt: skip
+"""Metres per unit."""
+
+
+def metres_per(unit: str) -> float:
+    """Look up a unit of length; an `InvalidInputError` names those that there are."""
+    if unit not in UNITS:
+        raise InvalidInputError(f"unit must be one of {', '.join(UNITS)}, not {unit!r:.40}")
+    return UNITS[unit]
+
+
+def box_array(box: ArrayLike) -> NDArray[np.float64]:
+    """Check a box, its lowest and its highest corner, and return it as (2, 3) float64."""
+    try:
+        corners = np.array(box, dtype=np.float64)
+    except (TypeError, ValueError):
+        corners = np.empty(0)
+    if corners.shape != (2, 3) or np.isnan(corners).any() or (corners[0] > corners[1]).any():
+        raise InvalidInputError("box must be two corners (2, 3), the lowest first")
+    return corners
+
+
+def cropped(cloud: PointCloud, box: NDArray[np.float64]) -> PointCloud:
+    """Keep the points in a box (both corners belong to it); points that are not finite are in none."""
+    with np.errstate(invalid="ignore"):
+        inside = np.ones(len(cloud), np.bool_)
+        for axis in range(3):
+            values = cloud.origin[axis] + cloud.offsets[:, axis]
+            inside &= (values >= box[0, axis]) & (values <= box[1, axis])
+    return cloud if inside.all() else cloud.at(np.flatnonzero(inside))
+
+
+def in_metres(cloud: PointCloud, metres: float) -> PointCloud:
+    """Multiply coordinates, and the viewpoint, by the metres per unit; in float64, where 1 is none."""
+    if metres == 1.0:
+        return cloud
+    viewpoint, viewpoints = (
+        None if place is None else place * metres for place in (cloud.viewpoint, cloud.viewpoints)
+    )
+    return replace(
+        cloud,
+        offsets=cloud.offsets.astype(np.float64) * metres,
+        origin=cloud.origin * metres,
+        viewpoint=viewpoint,
+        viewpoints=viewpoints,
+    )
