@@ -112,7 +112,7 @@ class PointCloud:
             scan = self.fields.get("scan")
             if scan is None or scan.ndim != 1 or scan.dtype.kind not in "iu":
                 raise InvalidInputError("viewpoints need a field 'scan' of whole numbers (n,)")
-            if len(scan) and not (0 <= int(scan.min()) and int(scan.max()) < len(self.viewpoints)):
+            if len(scan) and not (int(scan.min()) >= 0 and int(scan.max()) < len(self.viewpoints)):
                 raise InvalidInputError(f"field 'scan' must be 0 to {len(self.viewpoints) - 1}")
         if self.grid is not None:
             height, width = (int(side) for side in self.grid)
