@@ -27,10 +27,12 @@ def extract(
     points: NDArray[np.floating],
     *,
     origin: Sequence[float],
-    radius: float,
+    radius: float | None,
     axes: str,
+    neighbors: int | None = None,
     at: NDArray[np.uint32] | NDArray[np.float64] | None = None,
     viewpoint: Sequence[float] | None = None,
+    directions: NDArray[np.float32] | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> dict[str, NDArray[Any]]: ...

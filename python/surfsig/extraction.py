@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import enum
-import operator
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
 from surfsig._surfsig import Frame
+from surfsig.arguments import MOST_NEIGHBORS, place_numbers, positive_length, query_places, whole_number
 from surfsig.defaults import AXES, SIGNATURE_BLOCK, Axes
 from surfsig.errors import InvalidInputError
-from surfsig.point_cloud import PointCloud, coordinate_array, position_array
+from surfsig.orientation import orientation
+from surfsig.point_cloud import PointCloud, coordinate_array
 from surfsig.similarity import SIGNATURE, similarity
 
 FloatArray = NDArray[np.float32]
-
-LENGTHS = (1e-18, 1e18)
-"""What a radius or voxel may be: beyond, its square leaves float32."""
 
 
 class Status(enum.IntEnum):
@@ -48,13 +46,15 @@ class Extraction:
     Lengths are in the cloud's own unit, curvatures per that unit. NaN stands where there is no value.
     """
 
-    radius: float
-    """Radius of the balls."""
+    radius: float | FloatArray
+    """Radius of the balls; with `neighbors` each place's own, (m,): the distance to the farthest point
+    that counts, or the radius asked for where there are no more points within it."""
     axes: Axes
     """Axes in which the paraboloids were fitted."""
     oriented: bool
-    """Whether a known viewpoint oriented the normals; otherwise their side, and with it the sign of
-    curvature, is a convention (z, else y, else x of the normal is positive)."""
+    """Whether a known viewpoint, or normals that came with the cloud, oriented the normals; otherwise
+    their side, and with it the sign of curvature, is a convention (z, else y, else x of the normal is
+    positive)."""
     points: NDArray[np.floating]
     """The places, (m, 3)."""
     indices: NDArray[np.int64] | None
@@ -92,7 +92,8 @@ class Extraction:
     def __repr__(self) -> str:
         """Say what was extracted, and how it went."""
         counts = ", ".join(f"{name}: {n}" for name, n in self.status_counts().items())
-        return f"Extraction({len(self)} places, radius={self.radius:g}, axes={self.axes!r}, {counts})"
+        radius = f"{self.radius:g}" if isinstance(self.radius, float) else "its own"
+        return f"Extraction({len(self)} places, radius={radius}, axes={self.axes!r}, {counts})"
 
     @property
     def gaussian_curvature(self) -> FloatArray:
@@ -167,15 +168,9 @@ class Extraction:
         InvalidInputError
             If `at` is no set of places, or `flat_atom` is not a finite number above 0.
         """
-        places = _places(at, len(self))
+        places = place_numbers(at, len(self))
         frame = Frame.default() if frame is None else frame
-        side = 2.0 * self.radius
-        if self.coefficients is None:
-            k1, k2 = np.ascontiguousarray(self.k1[places]), np.ascontiguousarray(self.k2[places])
-            rows, status = frame.signatures_of_curvatures(k1, k2, side=side)
-        else:
-            surfaces = np.ascontiguousarray(self.coefficients[places])
-            rows, status = frame.signatures_of_surfaces(surfaces, side=side)
+        rows, status = self._signatures(places, frame)
         if flat_atom is not None:
             if not (np.isfinite(flat_atom) and flat_atom > 0):
                 raise InvalidInputError(f"flat_atom must be a finite number above 0, not {flat_atom}")
@@ -187,6 +182,23 @@ class Extraction:
         # The fit's own status says more, but for places that it left in order.
         fitted = self.status[places]
         return rows, np.where(status == Status.OK, fitted, status).astype(np.uint8)
+
+    def _signatures(self, places: NDArray[np.int64], frame: Frame) -> tuple[FloatArray, NDArray[np.uint8]]:
+        side, curvatures, surfaces = 1.0, (self.k1[places], self.k2[places]), self.coefficients
+        surfaces = None if surfaces is None else surfaces[places]
+        if isinstance(self.radius, float):
+            side = 2 * self.radius
+        else:
+            # In patch units a side is 1, so that each place may have its own.
+            sides = 2 * self.radius[places]
+            curvatures = (curvatures[0] * sides, curvatures[1] * sides)
+            if surfaces is not None:
+                one = np.ones_like(sides)
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    surfaces = surfaces * np.column_stack([sides, sides, one, one, sides, 1 / sides])
+        if surfaces is None:
+            return frame.signatures_of_curvatures(*curvatures, side=side)
+        return frame.signatures_of_surfaces(surfaces, side=side)
 
     def iter_signatures(
         self, *, frame: Frame | None = None, flat_atom: float | None = None, block: int = SIGNATURE_BLOCK
@@ -247,16 +259,18 @@ class Extraction:
 
 def extract(
     cloud: PointCloud | ArrayLike,
-    radius: float,
+    radius: float | None = None,
     *,
+    neighbors: int | None = None,
     axes: Axes = AXES,
     at: ArrayLike | None = None,
     voxel: float | None = None,
     viewpoint: ArrayLike | None = None,
+    normals: ArrayLike | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Extraction:
-    """Extract curvature from the points within a radius: eq. (5), and from it k1, k2, K and H.
+    """Extract curvature from the points around each place: eq. (5), and from it k1, k2, K and H.
 
     Parameters
     ----------
@@ -264,7 +278,10 @@ def extract(
         A `PointCloud`, or an array (n, 3) of numbers. Points that are not finite belong to no ball.
     radius
         Radius of the ball around each place, in the cloud's own unit; half the side D of the paper's
-        patch. Finite and above 0.
+        patch. Finite and above 0. May be left out where `neighbors` is given.
+    neighbors
+        That many nearest points, the place itself included where it is a point of the cloud; together
+        with `radius` at most that many of the points within it (a hybrid search).
     axes
         "surface": the paraboloid's height runs along its own normal, and the result turns with the
         object. "sensor": along z, as the paper fits; z runs away from the sensor.
@@ -274,8 +291,12 @@ def extract(
         In place of `at`: one point of each voxel of this size, the one nearest to the mean of the
         voxel's points.
     viewpoint
-        Where the sensor stood, (3,), in the cloud's coordinates; by default what the cloud says. It
-        orients the normals, and with them the sign of curvature.
+        Where the sensor stood, (3,), in the cloud's coordinates. It orients the normals, and with them
+        the sign of curvature. By default, in this order: `normals`, the cloud's own normals (fields
+        ``nx``, ``ny``, ``nz`` or ``normals``), its viewpoint, or its scans' viewpoints.
+    normals
+        Normals that somebody knows, one of each point of the cloud, (n, 3), of any length; only their
+        side counts. Places that are no points of the cloud do not take part.
     threads
         Number of threads; all cores by default. The result is the same, bit for bit.
     progress
@@ -292,97 +313,46 @@ def extract(
         If an argument has no meaning; its text says which.
     """
     cloud = cloud if isinstance(cloud, PointCloud) else PointCloud(coordinate_array(cloud))
-    radius = _positive(radius, "radius")
+    if radius is None and neighbors is None:
+        raise InvalidInputError("give a radius, or neighbors, or both")
+    size = None if radius is None else positive_length(radius, "radius")
+    most = None if neighbors is None else whole_number(neighbors, "neighbors", MOST_NEIGHBORS)
     if axes not in ("surface", "sensor"):
         raise InvalidInputError(f"axes must be 'surface' or 'sensor', not {axes!r}")
     if at is not None and voxel is not None:
         raise InvalidInputError("at and voxel exclude each other")
-    sensor = cloud.viewpoint if viewpoint is None else position_array(viewpoint, "viewpoint")
     origin: Sequence[float] = cloud.origin.tolist()
     indices: NDArray[np.int64] | None
     query: NDArray[np.uint32] | NDArray[np.float64] | None
     if voxel is not None:
-        query = _surfsig.voxel_representatives(cloud.offsets, origin=origin, voxel=_positive(voxel, "voxel"))
+        query = _surfsig.voxel_representatives(
+            cloud.offsets, origin=origin, voxel=positive_length(voxel, "voxel")
+        )
         indices, points = query.astype(np.int64), cloud.points[query]
     elif at is None:
         query, points = None, cloud.points
         indices = np.arange(len(cloud))
     else:
-        query, indices = _queries(at, len(cloud))
+        query, indices = query_places(at, len(cloud))
         points = query if indices is None else cloud.points[indices]
-    arrays = _surfsig.extract(
+    sensor, directions = orientation(cloud, viewpoint, normals, indices)
+    arrays: dict[str, Any] = _surfsig.extract(
         cloud.offsets,
         origin=origin,
-        radius=radius,
+        radius=size,
         axes=axes,
+        neighbors=most,
         at=query,
         viewpoint=None if sensor is None else sensor.tolist(),
-        threads=_threads(threads),
+        directions=directions,
+        threads=None if threads is None else whole_number(threads, "threads", 1024),
         progress=progress,
     )
     return Extraction(
-        radius=radius, axes=axes, oriented=sensor is not None, points=points, indices=indices, **arrays
+        radius=arrays.pop("radius", size),
+        **arrays,
+        axes=axes,
+        oriented=sensor is not None or directions is not None,
+        points=points,
+        indices=indices,
     )
-
-
-def _positive(value: float, what: str) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidInputError(f"{what} must be a finite number, not {value!r:.40}") from None
-    if not (np.isfinite(number) and number > 0):
-        raise InvalidInputError(f"{what} must be a finite number above 0, not {number:g}")
-    if not LENGTHS[0] <= number <= LENGTHS[1]:
-        raise InvalidInputError(f"{what} must be from {LENGTHS[0]:g} to {LENGTHS[1]:g}, not {number:g}")
-    return number
-
-
-def _threads(threads: int | None) -> int | None:
-    if threads is None:
-        return None
-    try:
-        number = operator.index(threads)
-    except TypeError:
-        raise InvalidInputError(f"threads must be a whole number, not {threads!r}") from None
-    if not 1 <= number <= 1024:
-        raise InvalidInputError(f"threads must be 1 to 1024, not {number}")
-    return number
-
-
-def _queries(
-    at: ArrayLike, count: int
-) -> tuple[NDArray[np.uint32] | NDArray[np.float64], NDArray[np.int64] | None]:
-    """Return what the core takes, and the points' numbers where they are points."""
-    try:
-        array = np.asarray(at)
-    except ValueError:
-        raise InvalidInputError("at must be places (m, 3); its rows differ in length") from None
-    if array.ndim == 2:
-        return coordinate_array(array, "at").astype(np.float64), None
-    indices = _places(array, count).astype(np.int64)
-    return indices.astype(np.uint32), indices
-
-
-def _places(at: ArrayLike | None, count: int) -> NDArray[np.int64]:
-    """Return numbers of places from numbers, of which negative ones count from the end, or a mask."""
-    if at is None:
-        return np.arange(count)
-    array = np.asarray(at)
-    if array.dtype == np.bool_:
-        if array.shape != (count,):
-            raise InvalidInputError(f"at: a mask must have the shape ({count},), not {array.shape}")
-        return np.flatnonzero(array)
-    if array.size == 0:
-        return np.zeros(0, np.int64)
-    if array.ndim != 1 or array.dtype.kind not in "iu":
-        raise InvalidInputError(
-            f"at must be whole numbers (m,), a mask, or places (m, 3), not {array.dtype} {array.shape}"
-        )
-    # Before unsigned numbers can wrap round.
-    if array.dtype.kind == "u" and array.max() >= count:
-        raise InvalidInputError(f"at: index {array.max()} is outside a cloud of {count} points")
-    numbers = array.astype(np.int64)
-    wrong = (numbers < -count) | (numbers >= count)
-    if wrong.any():
-        raise InvalidInputError(f"at: index {numbers[wrong][0]} is outside a cloud of {count} points")
-    return np.where(numbers < 0, numbers + count, numbers)

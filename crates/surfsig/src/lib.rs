@@ -45,7 +45,8 @@ pub use cell_index::CellIndex;
 pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
 pub use error::Error;
 pub use extract::{
-    ExtractOptions, Extraction, Monitor, Queries, Status, extract, extract_monitored, voxel_representatives,
+    ExtractOptions, Extraction, Monitor, Neighborhood, Queries, Status, extract, extract_monitored,
+    voxel_representatives,
 };
 pub use fit::FitAxes;
 pub use frame::{Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};

@@ -139,7 +139,11 @@ impl Task<'_> {
     #[inline(always)]
     fn towards_sensor(&self, normal: &Vector) -> Vector {
         match (self.to_sensor, self.axes) {
-            (Some(to_sensor), _) => to_sensor,
+            (Some(to_sensor), _) => {
+                // A direction of no length: nobody knows, and the answer is at least always the same.
+                let known = Lanes::ZERO.lt(dot(&to_sensor, &to_sensor));
+                chosen(known, &to_sensor, &upwards(normal))
+            }
             // The paper's z runs away from the sensor.
             (None, FitAxes::Sensor) => [Lanes::ZERO, Lanes::ZERO, -Lanes::ONE],
             // No sensor: up, so that the answer is at least always the same.
