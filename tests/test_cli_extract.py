@@ -222,7 +222,7 @@ def test_ctrl_c_keeps_the_old_output(tmp_path: Path) -> None:
     assert sorted(os.listdir(tmp_path)) == ["dense.ply", "out.ply"]
 
 
-def test_the_nearest_in_place_of_a_radius(shell: Callable[..., Finished], ball: Path, tmp_path: Path) -> None:
+def test_the_nearest_in_place_of_a_radius(shell: Callable[..., Any], ball: Path, tmp_path: Path) -> None:
     out = tmp_path / "nearest.npz"
     done = shell("extract", ball, "--neighbors", 40, "-o", out, "--like", "0,0,1.5", "--json")
     assert done.code == 0, done.err
