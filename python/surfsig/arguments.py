@@ -42,7 +42,7 @@ def whole_number(value: int, what: str, most: int) -> int:
     return number
 
 
-def queryplace_numbers(
+def query_places(
     at: ArrayLike, count: int
 ) -> tuple[NDArray[np.uint32] | NDArray[np.float64], NDArray[np.int64] | None]:
     """Return what the core takes, and the points' numbers where they are points."""
