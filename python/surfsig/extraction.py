@@ -37,6 +37,9 @@ class Status(enum.IntEnum):
     """The surface's own axes did not settle; the values are those of the last turn (edges, corners)."""
     OUTSIDE_VOCABULARY = 5
     """More curved than any atom of the frame: curvature, but no signature."""
+    ONE_SIDED = 6
+    """The points lie mostly on one side of the place (a rim): all values are there, with larger standard
+    errors, and biased where the surface is no paraboloid."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,6 +74,14 @@ class Extraction:
     """Root mean square of the points' heights above the fit, (m,)."""
     condition: FloatArray
     """At least this factor is on the standard error of the worst determined coefficient, (m,)."""
+    mean_curvature_std: FloatArray
+    """Standard error of the mean curvature, (m,), from the actual normal equations and the residual; NaN
+    in the sensor's axes, and where no more than six points are in the ball."""
+    k1_std: FloatArray
+    """Standard error of k1, (m,); where k1 and k2 do not differ significantly, they are biased apart by
+    0.7 to 0.8 of it, by nature."""
+    k2_std: FloatArray
+    """Standard error of k2, (m,)."""
     count: NDArray[np.uint32]
     """Points in the ball, (m,), the place itself included where it is a point of the cloud."""
     status: NDArray[np.uint8]
@@ -106,10 +117,17 @@ class Extraction:
         return 0.5 * (self.k1 + self.k2)
 
     @property
+    def noise(self) -> FloatArray:
+        """Standard deviation of a point's distance to the surface, (m,), from the residual and the count."""
+        count = self.count.astype(np.float32)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            freedom = np.where(count > 6, count - 6, np.nan)
+            return np.asarray(self.residual * np.sqrt(count / freedom), np.float32)
+
+    @property
     def ok(self) -> NDArray[np.bool_]:
-        """Where the status is `Status.OK`, (m,)."""
-        ok: NDArray[np.bool_] = self.status == Status.OK
-        return ok
+        """Where all values are there and mean what they say, (m,): `Status.OK` and `Status.ONE_SIDED`."""
+        return np.isin(self.status, (Status.OK, Status.ONE_SIDED))
 
     def status_counts(self) -> dict[str, int]:
         """Return how many places have each status, by its name in lower case; none that has none."""

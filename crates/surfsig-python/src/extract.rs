@@ -136,6 +136,9 @@ fn to_arrays(py: Python<'_>, extraction: Extraction) -> PyResult<Bound<'_, PyDic
     arrays.set_item("directions", matrix(py, extraction.directions)?)?;
     arrays.set_item("residual", extraction.residual.into_pyarray(py))?;
     arrays.set_item("condition", extraction.condition.into_pyarray(py))?;
+    arrays.set_item("mean_curvature_std", extraction.mean_curvature_std.into_pyarray(py))?;
+    arrays.set_item("k1_std", extraction.k1_std.into_pyarray(py))?;
+    arrays.set_item("k2_std", extraction.k2_std.into_pyarray(py))?;
     arrays.set_item("count", extraction.count.into_pyarray(py))?;
     let status: Vec<u8> = extraction.status.into_iter().map(|status| status as u8).collect();
     arrays.set_item("status", status.into_pyarray(py))?;

@@ -50,6 +50,12 @@ pub struct Extraction {
     /// How much, at least, the worst determined coefficient suffers from the points' arrangement: the
     /// factor on its standard error (1: not at all; about 1.5 on a full disc).
     pub condition: Vec<f32>,
+    /// Standard error of (k1 + k2) / 2. NaN in the sensor's axes.
+    pub mean_curvature_std: Vec<f32>,
+    /// Standard error of k1: right where k1 and k2 differ significantly.
+    pub k1_std: Vec<f32>,
+    /// Standard error of k2.
+    pub k2_std: Vec<f32>,
     /// Points in the ball, the query itself included where it is one of the cloud's.
     pub count: Vec<u32>,
     /// What became of each query.
@@ -100,6 +106,9 @@ impl Extraction {
         take(&mut self.directions, queries, &with.directions);
         take(&mut self.residual, queries, &with.residual);
         take(&mut self.condition, queries, &with.condition);
+        take(&mut self.mean_curvature_std, queries, &with.mean_curvature_std);
+        take(&mut self.k1_std, queries, &with.k1_std);
+        take(&mut self.k2_std, queries, &with.k2_std);
         take(&mut self.count, queries, &with.count);
         take(&mut self.status, queries, &with.status);
         take(&mut self.linearity, queries, &with.linearity);
@@ -140,6 +149,9 @@ pub(super) struct Columns {
     directions: Vec<[f32; 3]>,
     residual: Vec<f32>,
     condition: Vec<f32>,
+    mean_curvature_std: Vec<f32>,
+    k1_std: Vec<f32>,
+    k2_std: Vec<f32>,
     count: Vec<u32>,
     status: Vec<Status>,
     linearity: Vec<f32>,
@@ -159,6 +171,9 @@ pub(super) struct ColumnsPart<'a> {
     directions: &'a mut [[f32; 3]],
     residual: &'a mut [f32],
     condition: &'a mut [f32],
+    mean_curvature_std: &'a mut [f32],
+    k1_std: &'a mut [f32],
+    k2_std: &'a mut [f32],
     count: &'a mut [u32],
     status: &'a mut [Status],
     linearity: &'a mut [f32],
@@ -182,6 +197,9 @@ impl Columns {
             directions: vec![[0.0; 3]; len],
             residual: zeros(),
             condition: zeros(),
+            mean_curvature_std: zeros(),
+            k1_std: zeros(),
+            k2_std: zeros(),
             count: vec![0; len],
             status: vec![Status::NotFinite; len],
             linearity: zeros(),
@@ -200,6 +218,9 @@ impl Columns {
             &mut self.k2,
             &mut self.residual,
             &mut self.condition,
+            &mut self.mean_curvature_std,
+            &mut self.k1_std,
+            &mut self.k2_std,
             &mut self.linearity,
             &mut self.planarity,
             &mut self.scattering,
@@ -210,8 +231,18 @@ impl Columns {
         vectors
             .zip(numbers)
             .map(|((normals, directions), (count, status))| {
-                let [k1, k2, residual, condition, linearity, planarity, scattering] =
-                    scalars.each_mut().map(|column| column.next().expect("columns of one length"));
+                let [
+                    k1,
+                    k2,
+                    residual,
+                    condition,
+                    mean_curvature_std,
+                    k1_std,
+                    k2_std,
+                    linearity,
+                    planarity,
+                    scattering,
+                ] = scalars.each_mut().map(|column| column.next().expect("columns of one length"));
                 ColumnsPart {
                     radius: self.radius,
                     radii: radii.next().unwrap_or_default(),
@@ -221,6 +252,9 @@ impl Columns {
                     directions,
                     residual,
                     condition,
+                    mean_curvature_std,
+                    k1_std,
+                    k2_std,
                     count,
                     status,
                     linearity,
@@ -263,6 +297,9 @@ impl Columns {
             directions: vector(self.directions),
             residual: scalar(self.residual),
             condition: scalar(self.condition),
+            mean_curvature_std: scalar(self.mean_curvature_std),
+            k1_std: scalar(self.k1_std),
+            k2_std: scalar(self.k2_std),
             count: ordered(self.count, &entries, 0),
             status: ordered(self.status, &entries, Status::NotFinite),
             linearity: scalar(self.linearity),
@@ -292,6 +329,8 @@ impl ColumnsPart<'_> {
             Status::Degenerate
         } else if !fits.converged.get(lane) {
             Status::NotConverged
+        } else if fits.one_sided.get(lane) {
+            Status::OneSided
         } else {
             Status::Ok
         };
@@ -309,6 +348,10 @@ impl ColumnsPart<'_> {
         self.k2[entry] = curvature(fits.principal.k2.0[lane] / r);
         self.residual[entry] = curvature(fits.residual.0[lane] * r);
         self.condition[entry] = curvature(fits.condition.0[lane]);
+        let [c1, _, between, _, _, c2] = fits.covariance.map(|c| c.0[lane]);
+        self.k1_std[entry] = curvature(c1.sqrt() / r);
+        self.k2_std[entry] = curvature(c2.sqrt() / r);
+        self.mean_curvature_std[entry] = curvature(0.5 * (c1 + between + between + c2).sqrt() / r);
         self.directions[entry] = fits.principal.direction.map(|v| curvature(v.0[lane]));
         if let Some(coefficients) = self.coefficients.get_mut(entry) {
             // Heights grow away from the sensor, and the normal points to it.
