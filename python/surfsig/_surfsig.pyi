@@ -33,6 +33,7 @@ def extract(
     at: NDArray[np.uint32] | NDArray[np.float64] | None = None,
     viewpoint: Sequence[float] | None = None,
     directions: NDArray[np.float32] | None = None,
+    robust: bool = False,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> dict[str, NDArray[Any]]: ...

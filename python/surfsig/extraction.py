@@ -285,6 +285,7 @@ def extract(
     voxel: float | None = None,
     viewpoint: ArrayLike | None = None,
     normals: ArrayLike | None = None,
+    robust: bool = False,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Extraction:
@@ -315,6 +316,9 @@ def extract(
     normals
         Normals that somebody knows, one of each point of the cloud, (n, 3), of any length; only their
         side counts. Places that are no points of the cloud do not take part.
+    robust
+        Leave out points farther from the fitted surface than three standard deviations of the others, and
+        fit again, until the choice stands; `count` is then the number of points that stay.
     threads
         Number of threads; all cores by default. The result is the same, bit for bit.
     progress
@@ -363,6 +367,7 @@ def extract(
         at=query,
         viewpoint=None if sensor is None else sensor.tolist(),
         directions=directions,
+        robust=robust,
         threads=None if threads is None else whole_number(threads, "threads", 1024),
         progress=progress,
     )

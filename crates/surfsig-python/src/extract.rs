@@ -51,7 +51,7 @@ fn neighborhood(radius: Option<f64>, neighbors: Option<usize>) -> PyResult<Neigh
 
 /// Extract curvature; see `surfsig.extract` for what the arguments and the arrays mean.
 #[pyfunction]
-#[pyo3(signature = (points, *, origin, radius, axes, neighbors=None, at=None, viewpoint=None, directions=None, threads=None, progress=None))]
+#[pyo3(signature = (points, *, origin, radius, axes, neighbors=None, at=None, viewpoint=None, directions=None, robust=false, threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
 pub fn extract<'py>(
     py: Python<'py>,
@@ -63,6 +63,7 @@ pub fn extract<'py>(
     at: Option<At<'py>>,
     viewpoint: Option<[f64; 3]>,
     directions: Option<PyReadonlyArray2<'py, f32>>,
+    robust: bool,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
@@ -79,7 +80,7 @@ pub fn extract<'py>(
     };
     let neighborhood = neighborhood(radius, neighbors)?;
     let directions = directions.as_ref().map(rows::<f32, 3>).transpose()?;
-    let options = ExtractOptions { axes, viewpoint, directions, threads, instruction_set: None };
+    let options = ExtractOptions { axes, viewpoint, directions, robust, threads, instruction_set: None };
     let monitor = Monitor::default();
     let total = queries.len(&cloud);
     let run = || surfsig::extract_monitored(&cloud, neighborhood, &queries, &options, &monitor);

@@ -4,12 +4,11 @@
 //! affair: moments today, a robust re-weighting or a pooled descriptor as well. A [`MomentSource`]
 //! gives the 35 sums of a ball, whichever way it comes by them.
 
+use crate::block_sums::BlockSums;
 use crate::cell_index::{CellIndex, Row, RowKey};
 use crate::moments::{Moments, Scalar};
 use crate::simd::InstructionSet;
-use crate::simd::accumulate::accumulate;
 use crate::simd::select::{BLOCK, Ball, Block, PADDING, Place, Rows, Window, gather};
-use std::marker::PhantomData;
 
 /// Sees every point of a ball once, in the order of the lattice.
 pub(crate) trait BallVisitor {
@@ -57,7 +56,7 @@ struct NearRow {
 /// Walks over the points themselves: the plain way, and the reference of every other.
 pub(crate) struct DirectWalk<'a> {
     index: &'a CellIndex,
-    set: InstructionSet,
+    pub set: InstructionSet,
     scale: f32,
     /// The present row, so that coming back to it costs nothing.
     row: Option<RowKey>,
@@ -65,7 +64,6 @@ pub(crate) struct DirectWalk<'a> {
     /// What the present run's balls may reach.
     windows: Vec<Window>,
     block: Box<Block>,
-    members: Members,
 }
 
 impl<'a> DirectWalk<'a> {
@@ -79,7 +77,6 @@ impl<'a> DirectWalk<'a> {
             near: Vec::new(),
             windows: Vec::new(),
             block: Box::new(Block::new()),
-            members: Members::default(),
         }
     }
 
@@ -177,93 +174,9 @@ impl MomentSource for DirectWalk<'_> {
     }
 
     fn moments<S: Scalar>(&mut self, offset: [f32; 3]) -> Moments<f64> {
-        let mut sums = BlockSums::<S> { set: self.set, total: Moments::default(), scalar: PhantomData };
+        let mut sums = BlockSums::<S>::new(self.set);
         self.visit(offset, &mut sums);
         sums.total
-    }
-}
-
-impl DirectWalk<'_> {
-    /// The moments of the `most` nearest points of the ball in units of their radius, and that radius in
-    /// units of the ball's: the distance to the farthest of them, or `radius_of_fewer` where the ball holds
-    /// no more than that.
-    pub fn nearest_moments<S: Scalar>(
-        &mut self,
-        offset: [f32; 3],
-        most: usize,
-        radius_of_fewer: Option<f64>,
-    ) -> (Moments<f64>, f64) {
-        let mut members = std::mem::take(&mut self.members);
-        members.clear();
-        self.visit(offset, &mut members);
-        let fewer = members.points.len() <= most;
-        let farthest = members.keep_nearest(most);
-        let mut sums = BlockSums::<S> { set: self.set, total: Moments::default(), scalar: PhantomData };
-        members.blocks(&mut self.block, |block, len| sums.visit(block, len));
-        self.members = members;
-        let radius = radius_of_fewer.filter(|_| fewer).unwrap_or(farthest);
-        // Points at one place have no size; any unit does for sums of zeros.
-        (sums.total.scaled(if radius > 0.0 { 1.0 / radius } else { 1.0 }), radius)
-    }
-}
-
-/// The visitor that remembers all members, with their squared distances.
-#[derive(Default)]
-struct Members {
-    points: Vec<[f32; 3]>,
-    squares: Vec<f32>,
-    sorted: Vec<(f32, u32)>,
-}
-
-impl BallVisitor for Members {
-    const WANTS_RANKS: bool = false;
-
-    fn visit(&mut self, block: &Block, len: usize) {
-        for i in 0..len {
-            let (x, y, z) = (block.x[i], block.y[i], block.z[i]);
-            self.points.push([x, y, z]);
-            self.squares.push(z.mul_add(z, y.mul_add(y, x * x)));
-        }
-    }
-}
-
-impl Members {
-    fn clear(&mut self) {
-        self.points.clear();
-        self.squares.clear();
-    }
-
-    /// Keeps the nearest, in the order in which they came, and says how far the farthest of them is.
-    fn keep_nearest(&mut self, most: usize) -> f64 {
-        if self.points.len() > most {
-            self.sorted.clear();
-            self.sorted.extend(self.squares.iter().zip(0..).map(|(&square, i)| (square, i)));
-            let order = |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-            let last = *self.sorted.select_nth_unstable_by(most - 1, order).1;
-            let mut kept = 0;
-            for i in 0..self.points.len() {
-                if order(&(self.squares[i], i as u32), &last).is_le() {
-                    self.points[kept] = self.points[i];
-                    kept += 1;
-                }
-            }
-            self.points.truncate(kept);
-            return f64::from(last.0).sqrt();
-        }
-        f64::from(self.squares.iter().copied().fold(0.0, f32::max)).sqrt()
-    }
-
-    /// Hands the points on as blocks that are padded with zeros.
-    fn blocks(&self, block: &mut Block, mut sum: impl FnMut(&Block, usize)) {
-        for points in self.points.chunks(BLOCK) {
-            for (i, &point) in points.iter().enumerate() {
-                [block.x[i], block.y[i], block.z[i]] = point;
-            }
-            for i in points.len()..points.len().next_multiple_of(PADDING) {
-                (block.x[i], block.y[i], block.z[i]) = (0.0, 0.0, 0.0);
-            }
-            sum(block, points.len());
-        }
     }
 }
 
@@ -290,24 +203,6 @@ fn seek(x: &[f32], range: std::ops::Range<usize>, from: usize, before: impl Fn(f
         low = probe;
     }
     low + x[low..high].partition_point(|&v| before(v))
-}
-
-/// The visitor that sums: blocks in `S`, their totals in `f64`.
-struct BlockSums<S> {
-    set: InstructionSet,
-    total: Moments<f64>,
-    scalar: PhantomData<S>,
-}
-
-impl<S: Scalar> BallVisitor for BlockSums<S> {
-    const WANTS_RANKS: bool = false;
-
-    fn visit(&mut self, block: &Block, len: usize) {
-        let sums = accumulate::<S>(self.set, block, len);
-        for (total, sum) in self.total.sums.iter_mut().zip(sums) {
-            *total += sum.to_f64();
-        }
-    }
 }
 
 #[cfg(test)]

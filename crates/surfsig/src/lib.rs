@@ -29,12 +29,14 @@
 //! ([`FitAxes`]) -> curvature ([`Paraboloid`]) -> [`Frame`] -> [`similarity`]; [`extract()`] walks it.
 
 mod ball;
+mod block_sums;
 mod cell_index;
 mod curvature;
 mod error;
 mod extract;
 mod fit;
 mod frame;
+mod members;
 mod moments;
 mod point_cloud;
 mod simd;

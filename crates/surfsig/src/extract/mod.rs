@@ -4,6 +4,7 @@ mod extraction;
 mod monitor;
 mod neighborhood;
 mod queries;
+mod robust;
 mod status;
 
 pub use extraction::Extraction;
@@ -17,6 +18,7 @@ use crate::cell_index::{CellIndex, Row, RowKey};
 use crate::fit::FitAxes;
 use crate::fit::paraboloid::{Paraboloids, Task, fit_paraboloids};
 use crate::fit::tensor::MomentBatch;
+use crate::members::Members;
 use crate::moments::{Moments, Scalar};
 use crate::simd::InstructionSet;
 use crate::simd::lanes::{LANES, Lanes};
@@ -25,6 +27,7 @@ use crate::{Error, PointCloud, Radius};
 use extraction::{Columns, ColumnsPart};
 use neighborhood::first_radius;
 use rayon::prelude::*;
+use robust::without_outliers;
 use std::ops::Range;
 
 /// Queries that one thread takes at a time.
@@ -50,6 +53,9 @@ pub struct ExtractOptions<'a> {
     /// normal that somebody knows. It chooses the side of the fitted normal and nothing else; where it is
     /// zero or not finite, nobody knows.
     pub directions: Option<&'a [[f32; 3]]>,
+    /// Leave out points that are far from the fitted surface, by three standard deviations of the others, and
+    /// fit again, until none is left out or comes back. The count is then that of the points that stay.
+    pub robust: bool,
     /// Number of threads; all cores where it is `None`. The result is the same, bit for bit.
     pub threads: Option<usize>,
     /// Instructions to use; the best there are where it is `None`. The result is the same, bit for bit.
@@ -189,6 +195,9 @@ struct Worker<'a> {
     set: InstructionSet,
     pending: Vec<Pending>,
     moments: Vec<Moments<f64>>,
+    /// Of each pending query, where its points are looked at more than once.
+    members: Vec<Members>,
+    distances: Vec<f64>,
 }
 
 /// A query whose moments wait for their batch.
@@ -214,7 +223,8 @@ impl<'a> Worker<'a> {
     ) -> Self {
         let walk = DirectWalk::new(index, set);
         let (pending, moments) = (Vec::with_capacity(LANES), Vec::with_capacity(LANES));
-        Self { walk, asked, neighborhood, options, set, pending, moments }
+        let members = (0..LANES).map(|_| Members::new()).collect();
+        Self { walk, asked, neighborhood, options, set, pending, moments, members, distances: Vec::new() }
     }
 
     /// Fills a part of the columns, whose first entry is the query of rank `first`.
@@ -261,7 +271,7 @@ impl<'a> Worker<'a> {
         self.walk.enter_run(low, high);
         for rank in run.clone() {
             let offset = [x[rank], y[rank], z[rank]];
-            let (moments, radius) = self.around::<f32>(offset);
+            let (moments, radius) = self.around::<f32>(offset, self.pending.len());
             let query = self.asked.point_of_rank[rank];
             self.pending.push(Pending { key, offset, entry: rank - first, query, radius });
             self.moments.push(moments);
@@ -276,12 +286,17 @@ impl<'a> Worker<'a> {
 
     /// The moments around a query in units of its neighbourhood's radius, and that radius in units of the
     /// lattice's.
-    fn around<S: Scalar>(&mut self, offset: [f32; 3]) -> (Moments<f64>, f64) {
-        match self.neighborhood {
-            Neighborhood::Ball(_) => (self.walk.moments::<S>(offset), 1.0),
-            Neighborhood::Nearest(k) => self.walk.nearest_moments::<S>(offset, k, None),
-            Neighborhood::Hybrid { most, .. } => self.walk.nearest_moments::<S>(offset, most, Some(1.0)),
-        }
+    fn around<S: Scalar>(&mut self, offset: [f32; 3], lane: usize) -> (Moments<f64>, f64) {
+        let (most, radius_of_fewer) = match self.neighborhood {
+            Neighborhood::Ball(_) if !self.options.robust => return (self.walk.moments::<S>(offset), 1.0),
+            Neighborhood::Ball(_) => (usize::MAX, Some(1.0)),
+            Neighborhood::Nearest(k) => (k, None),
+            Neighborhood::Hybrid { most, .. } => (most, Some(1.0)),
+        };
+        let members = &mut self.members[lane];
+        members.take(&mut self.walk, offset);
+        let radius = members.keep_nearest(most, radius_of_fewer);
+        (members.moments::<S>(self.set, |_| true), radius)
     }
 
     /// Fits and writes the pending queries; says whether the walk has moved for it.
@@ -295,10 +310,13 @@ impl<'a> Worker<'a> {
             let Pending { key, offset, .. } = self.pending[lane];
             self.walk.enter_row(key);
             self.walk.enter_run(offset, offset);
-            self.moments[lane] = self.around::<f64>(offset).0;
+            self.moments[lane] = self.around::<f64>(offset, lane).0;
         }
         if !again.is_empty() {
             fits = self.fit();
+        }
+        if self.options.robust {
+            fits = self.fit_without_outliers(fits);
         }
         for (lane, (query, moments)) in self.pending.iter().zip(&self.moments).enumerate() {
             part.write(query.entry, moments.sums[0], query.radius, &fits, lane);
@@ -306,6 +324,26 @@ impl<'a> Worker<'a> {
         self.pending.clear();
         self.moments.clear();
         !again.is_empty()
+    }
+
+    /// Fits again, without the points that are far from the fits, until the choice of points stands.
+    fn fit_without_outliers(&mut self, mut fits: Paraboloids) -> Paraboloids {
+        for _ in 0..robust::MAX_PASSES {
+            let mut changed = false;
+            for lane in 0..self.pending.len() {
+                let fitted = self.moments[lane].count();
+                let (members, distances) = (&mut self.members[lane], &mut self.distances);
+                if let Some(moments) = without_outliers(members, &fits, lane, fitted, self.set, distances) {
+                    self.moments[lane] = moments;
+                    changed = true;
+                }
+            }
+            if !changed {
+                break;
+            }
+            fits = self.fit();
+        }
+        fits
     }
 
     fn fit(&self) -> Paraboloids {

@@ -51,7 +51,7 @@ impl Neighborhood {
     }
 }
 
-/// A radius that holds k points around a quarter of the points, estimated at a few of them; later
+/// A radius that holds k points around three quarters of the points, estimated at a few of them; later
 /// passes double it for those that need more.
 pub(super) fn first_radius(cloud: &PointCloud<'_>, k: usize, monitor: &Monitor) -> Result<Radius, Error> {
     let positions: Vec<[f64; 3]> = (0..cloud.len()).filter_map(|i| cloud.position(i)).collect();
@@ -69,8 +69,8 @@ pub(super) fn first_radius(cloud: &PointCloud<'_>, k: usize, monitor: &Monitor) 
         })
         .collect::<Result<Vec<f64>, Error>>()?;
     distances.sort_unstable_by(f64::total_cmp);
-    let quarter = distances.get(distances.len() / 4).copied().unwrap_or(1.0);
-    let found = distances.into_iter().find(|&d| d >= quarter && d > 0.0).unwrap_or(1.0);
+    let most = distances.get(3 * distances.len() / 4).copied().unwrap_or(1.0);
+    let found = distances.into_iter().find(|&d| d >= most && d > 0.0).unwrap_or(1.0);
     // Not below what float64 can number at these coordinates.
-    Radius::new((1.001 * found).clamp(1e-12 * largest.max(1e-6), 1e17))
+    Radius::new((1.05 * found).clamp(1e-12 * largest.max(1e-6), 1e17))
 }

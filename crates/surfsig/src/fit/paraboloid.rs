@@ -70,7 +70,8 @@ pub(crate) struct Task<'a> {
 pub(crate) struct Paraboloids {
     pub principal: Principal,
     pub spread: [Lanes; 3],
-    /// a, b, c, d, e, f of eq. (5).
+    pub axes: Axes,
+    /// a, b, c, d, e, f of eq. (5) over these axes.
     pub coefficients: [Lanes; 6],
     pub residual: Lanes,
     pub condition: Lanes,
@@ -146,6 +147,7 @@ fn fit(task: &Task<'_>) -> Paraboloids {
     Paraboloids {
         principal,
         spread: eigenvalues,
+        axes,
         coefficients: solution.coefficients,
         residual: solution.residual_square.max(Lanes::ZERO).sqrt(),
         condition: Lanes::ONE / solution.smallest_pivot.sqrt(),
