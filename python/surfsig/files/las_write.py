@@ -1,4 +1,4 @@
-"""Writing LAS and LAZ, through laspy: version 1.4, point formats 6 to 8, all further columns as extra bytes."""
+"""Writing LAS and LAZ, through laspy: version 1.4, point formats 6 to 8, further columns as extra bytes."""
 
 from __future__ import annotations
 
@@ -83,7 +83,9 @@ def _write(
     finite = cloud.finite
     left_out = len(cloud) - int(np.count_nonzero(finite))
     if left_out:
-        warnings.warn(f"{left_out} points that are not finite are left out: LAS cannot hold them", stacklevel=4)
+        warnings.warn(
+            f"{left_out} points that are not finite are left out: LAS cannot hold them", stacklevel=4
+        )
     offset, decimals = _steps(cloud, finite)
     scalars = scalar_columns(columns)
     header = laspy.LasHeader(version="1.4", point_format=_point_format(scalars))
@@ -124,7 +126,7 @@ def _write(
     kept_error = _KeepsError(file)
     try:
         writer = laspy.LasWriter(
-            kept_error,  # type: ignore[arg-type]
+            kept_error,
             header,
             do_compress=compressed,
             laz_backend=laspy.LazBackend.LazrsParallel,

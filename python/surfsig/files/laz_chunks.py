@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import struct
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
@@ -131,7 +132,7 @@ def copc_chunks(
         file.seek(offset)
         entries = np.frombuffer(file.read(length), _HIERARCHY_ENTRY)
         entries = entries[entries["level"] >= 0]
-        side = 2 * info.halfsize / 2.0 ** entries["level"][:, None]
+        side = 2 * info.halfsize * 2.0 ** -entries["level"][:, None].astype(np.float64)
         corner = low + entries["cell"] * side
         touches = ((corner - margin <= box[1]) & (corner + side + margin >= box[0])).all(axis=1)
         for entry in entries[touches]:
@@ -142,8 +143,9 @@ def copc_chunks(
                 chunks.append(Chunk(place, length, points))
     chunks.sort()
     if (
-        any(chunk.size < 0 or chunk.points < 0 or chunk.offset + chunk.size > size for chunk in chunks)
-        or sum(chunk.size for chunk in chunks) > size
+        any(chunk.size < 0 or chunk.points < 0 for chunk in chunks)
+        or any(first.offset + first.size > second.offset for first, second in pairwise(chunks))
+        or (chunks and chunks[-1].offset + chunks[-1].size > size)
         or sum(chunk.points for chunk in chunks) > header.point_count
     ):
         raise FileFormatError(
@@ -166,12 +168,13 @@ def decoded(
 
     dtype = header.point_format.dtype()
     record = _laszip_record(header, source)
+    layers = _layers(record, header)
     for piece in _pieces(chunks, dtype.itemsize):
         parts = []
         for chunk in piece:
             file.seek(chunk.offset)
             parts.append(file.read(chunk.size))
-            _check_chunk(parts[-1], chunk, header, source)
+            _check_chunk(parts[-1], chunk, dtype.itemsize, layers, source)
         points = np.zeros(sum(chunk.points for chunk in piece) * dtype.itemsize, np.uint8)
         with one_line_errors(source):
             lazrs.decompress_points_with_chunk_table(
@@ -224,18 +227,23 @@ def _pieces(chunks: Sequence[Chunk], point_size: int) -> Iterator[list[Chunk]]:
         yield piece
 
 
-def _check_chunk(data: bytes, chunk: Chunk, header: LasHeader, source: str) -> None:
+def _layers(record: bytes, header: LasHeader) -> int:
+    """Count the layers that a chunk is compressed in: none before point format 6."""
+    if header.point_format.id < 6:
+        return 0
+    items = np.frombuffer(record[_ITEMS_START:], "<u2").reshape(-1, 3)
+    return sum(int(size) if item == _BYTE14 else _LAYERS[int(item)] for item, size, _ in items)
+
+
+def _check_chunk(data: bytes, chunk: Chunk, point_size: int, layers: int, source: str) -> None:
     """Compare what a chunk promises with what it holds."""
-    kind = header.point_format
-    promised = chunk.points * kind.size
-    whole = len(data) == chunk.size >= kind.size and promised <= max(PIECE_BYTES, MAX_RATIO * chunk.size)
-    if whole and kind.id >= 6:
+    promised = chunk.points * point_size
+    whole = len(data) == chunk.size >= point_size and promised <= max(PIECE_BYTES, MAX_RATIO * chunk.size)
+    if whole and layers:
         # A whole point, the number of points, each layer's size, the layers.
-        items = np.frombuffer(_laszip_record(header, source)[_ITEMS_START:], "<u2").reshape(-1, 3)
-        layers = sum(int(size) if item == _BYTE14 else _LAYERS[int(item)] for item, size, _ in items)
-        before = kind.size + 4 + 4 * layers
-        sizes = np.frombuffer(data[kind.size + 4 : before], "<u4") if before <= len(data) else None
-        whole = sizes is not None and before + int(sizes.sum(dtype=np.uint64)) <= len(data)
+        before = point_size + 4 + 4 * layers
+        sizes = np.frombuffer(data[point_size + 4 : before].ljust(4 * layers, b"\xff"), "<u4")
+        whole = before + int(sizes.sum(dtype=np.uint64)) <= len(data)
     if not whole:
         raise FileFormatError(
             f"{source}: cut off or broken: a chunk promises {chunk.points} points in {chunk.size} bytes"

@@ -35,9 +35,7 @@ def box_array(box: ArrayLike) -> NDArray[np.float64]:
     return corners
 
 
-def inside(
-    offsets: NDArray[Any], origin: NDArray[np.float64], box: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def inside(offsets: NDArray[Any], origin: NDArray[np.float64], box: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Tell which points are in a box (both corners belong to it); points that are not finite are in none."""
     chosen = np.ones(len(offsets), np.bool_)
     with np.errstate(invalid="ignore"):
