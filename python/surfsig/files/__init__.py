@@ -158,8 +158,8 @@ def write(
         to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields.
     columns
         (n,) or (n, k) numbers by name. ``normals`` (n, 3) are written as nx, ny, nz and ``colors`` (n, 3 or
-        4) as red, green, blue (and alpha). In PLY, LAS and LAZ any other (n, k) column becomes NAME_0, NAME_1,
-        ...; in NPZ and Parquet it stays one. A field of the cloud with the same name is kept as
+        4) as red, green, blue (and alpha). Any other (n, k) column stays one in NPZ and Parquet, and becomes
+        NAME_0, NAME_1, ... in PLY, LAS and LAZ. A field of the cloud with the same name is kept as
         ``input_NAME``.
     chunks
         One more column, (n, width), given block by block so that it need not fit in memory.
