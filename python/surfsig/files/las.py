@@ -30,6 +30,8 @@ _VLR_HEADER_BYTES = 54
 _SMALLEST_HEADER = 227
 # Few enough that a block of records stays in the processor's cache while it is taken apart.
 _BLOCK_POINTS = 1 << 13
+# A scale or offset with which coordinates could become infinite.
+_ABSURD = 1e200
 # No field has this name.
 _COORDINATES = ""
 
@@ -57,8 +59,8 @@ def read(
     size = os.fstat(file.fileno()).st_size
     header = _read_header(file, source, size)
     origin = np.array(header.offsets)
-    if not (np.isfinite(origin).all() and np.isfinite(header.scales).all()):
-        raise FileFormatError(f"{source}: the scale or offset in its header is not finite")
+    if not (np.abs([origin, header.scales]) < _ABSURD).all():
+        raise FileFormatError(f"{source}: the scale or offset in its header makes no sense")
     columns = _Columns(header.point_count)
     for block in _blocks(file, header, box, source, size, progress):
         offsets = np.column_stack([block[axis] * header.scales[i] for i, axis in enumerate("XYZ")])
@@ -177,9 +179,11 @@ def _fields(block: NDArray[Any], header: LasHeader) -> dict[str, NDArray[Any]]:
     fields = {name: np.asarray(record[name]) for name in kind.standard_dimension_names if name not in "XYZ"}
     for dimension in kind.extra_dimensions:
         values = block[dimension.name]
-        fields[dimension.name] = (
-            values * dimension.scales + dimension.offsets if dimension.is_scaled else values
-        )
+        if dimension.is_scaled:
+            # What a program left unset may have any scale.
+            with np.errstate(over="ignore", invalid="ignore"):
+                values = values * dimension.scales + dimension.offsets
+        fields[dimension.name] = values
     return fields
 
 

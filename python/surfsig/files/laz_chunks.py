@@ -97,6 +97,7 @@ def laz_chunks(file: BinaryIO, header: LasHeader, source: str, size: int) -> lis
     return [chunk for chunk in chunks if chunk.points]
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def copc_chunks(
     file: BinaryIO, header: LasHeader, box: NDArray[np.float64], source: str, size: int
 ) -> list[Chunk] | None:
