@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from ctypes import byref, c_size_t, c_void_p
 from pathlib import Path
@@ -32,6 +33,27 @@ int main(void) {
   printf("%s\\n%d\\n%s\\n%d\\n", surfsig_version(), code == SURFSIG_CODE_INVALID_INPUT, surfsig_last_error(),
          extraction == NULL && surfsig_extraction_status(extraction) == NULL);
   return 0;
+}
+"""
+
+IN_CPP = """
+#include <surfsig.hpp>
+#include <cstdio>
+struct Wide { float intensity; double x, y, z; };
+int main() {
+  const double origin[3] = {500000.0, 4500000.0, 0.0};
+  std::vector<Wide> wide;
+  for (int i = 0; i < 900; ++i) wide.push_back({0.0f, i % 30 * 0.1, i / 30 * 0.1, 3.0});
+  const auto found = surfsig::extract(wide, 0.55, surfsig::Options().indices({464}).threads(1), origin);
+  std::printf("%zu %u %.3f\\n", found.size(), found.count()[0], found.normals()[2]);
+  std::vector<surfsig_status> statuses;
+  const auto none = surfsig::extract(std::vector<Wide>(), 0.5);
+  std::printf("%zu %zu %zu\\n", none.size(), none.k1().size(), none.signatures({}, &statuses).size());
+  try {
+    found.signatures({1}, &statuses);
+  } catch (const surfsig::Error &error) {
+    std::printf("%d %s\\n", error.code == SURFSIG_CODE_INVALID_INPUT, error.what());
+  }
 }
 """
 
@@ -86,18 +108,32 @@ def points() -> NDArray[np.float32]:
     return array
 
 
-def test_a_program_in_c11(installed: Path, tmp_path: Path) -> None:
-    source, program = tmp_path / "main.c", tmp_path / "main"
-    source.write_text(IN_C)
-    library = installed / "lib"
+def output_of(source: Path, text: str, installed: Path, compiler: str, standard: str) -> list[str]:
+    """Compile a program without a warning, run it, and return its lines."""
+    source.write_text(text)
+    program, library = source.with_suffix(""), installed / "lib"
     run(
-        *("cc", "-std=c11", *STRICT, f"-I{installed / 'include'}", source, "-o", program),
+        *(compiler, f"-std={standard}", *STRICT, f"-I{installed / 'include'}", source, "-o", program),
         *(f"-L{library}", "-lsurfsig_c", f"-Wl,-rpath,{library}"),
     )
-    version, refused, message, nothing = run(program).splitlines()
+    return run(program).splitlines()
+
+
+def test_a_program_in_c11(installed: Path, tmp_path: Path) -> None:
+    version, refused, message, nothing = output_of(tmp_path / "main.c", IN_C, installed, "cc", "c11")
     assert version == surfsig.__version__
     assert message == "a radius or voxel must be a finite number from 1e-18 to 1e18, not 0e0"
     assert (refused, nothing) == ("1", "1")
+
+
+@pytest.mark.parametrize("standard", ["c++14", "c++20"])
+def test_a_program_in_cpp(installed: Path, tmp_path: Path, standard: str) -> None:
+    one, none, refused = output_of(tmp_path / "main.cpp", IN_CPP, installed, "c++", standard)
+    # The points of a square lattice within 5.5 steps.
+    within = sum(i * i + j * j < 5.5**2 for i in range(-5, 6) for j in range(-5, 6))
+    assert one == f"1 {within} 1.000"
+    assert none == "0 0 0"
+    assert refused == "1 place 1 is outside an extraction of 1 places"
 
 
 @pytest.mark.parametrize("target", ["surfsig", "static"])
@@ -248,6 +284,21 @@ def test_places_outside(c: CInterface, points: NDArray[np.float32]) -> None:
             c.signatures(made, None, 1201)
         far = c.functions.surfsig_signatures(made, c_void_p(), c_size_t(2**63), byref(made), c_void_p())
         assert far == INVALID_INPUT
+
+
+def test_many_threads_at_once(c: CInterface, points: NDArray[np.float32]) -> None:
+    expected = surfsig.extract(points, RADIUS).signatures()
+
+    def one(number: int) -> None:
+        # Each thread reads its own error, whatever the others do.
+        for stride in range(number + 1):
+            with pytest.raises(Failed, match=f"not {stride}$"):
+                c.extract(address(points), len(points), stride, RADIUS)
+        with extracted(c, points) as made:
+            np.testing.assert_array_equal(c.signatures(made, None, len(points))[0], expected)
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(one, range(8)))
 
 
 def test_names(c: CInterface) -> None:
