@@ -77,6 +77,11 @@ enum surfsig_status
    * The surface is more curved than any atom of the frame: curvature, but no signature.
    */
   SURFSIG_STATUS_OUTSIDE_VOCABULARY = 5,
+  /**
+   * The points lie mostly on one side, as at the rim of a scan: all values are there, with the standard
+   * errors of such a patch, and a bias where the surface is not a paraboloid.
+   */
+  SURFSIG_STATUS_ONE_SIDED = 6,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

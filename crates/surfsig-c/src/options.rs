@@ -24,7 +24,7 @@ const SENSOR: c_int = surfsig_axes::Sensor as c_int;
 /// How an extraction is done. Made by surfsig_options_new(), freed by surfsig_options_free().
 #[derive(Default)]
 pub struct surfsig_options {
-    pub extract: ExtractOptions,
+    pub extract: ExtractOptions<'static>,
     indices: Option<Vec<u32>>,
 }
 

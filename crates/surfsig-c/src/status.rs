@@ -20,17 +20,21 @@ pub enum surfsig_status {
     NotConverged = 4,
     /// The surface is more curved than any atom of the frame: curvature, but no signature.
     OutsideVocabulary = 5,
+    /// The points lie mostly on one side, as at the rim of a scan: all values are there, with the standard
+    /// errors of such a patch, and a bias where the surface is not a paraboloid.
+    OneSided = 6,
 }
 
 // Columns of the core's statuses are handed out as they are: the numbers must be the same.
 const _: () = {
-    assert!(Status::ALL.len() == 6);
+    assert!(Status::ALL.len() == 7);
     assert!(surfsig_status::Ok as u8 == Status::Ok as u8);
     assert!(surfsig_status::NotFinite as u8 == Status::NotFinite as u8);
     assert!(surfsig_status::TooFewPoints as u8 == Status::TooFewPoints as u8);
     assert!(surfsig_status::Degenerate as u8 == Status::Degenerate as u8);
     assert!(surfsig_status::NotConverged as u8 == Status::NotConverged as u8);
     assert!(surfsig_status::OutsideVocabulary as u8 == Status::OutsideVocabulary as u8);
+    assert!(surfsig_status::OneSided as u8 == Status::OneSided as u8);
 };
 
 static NAMES: LazyLock<[CString; Status::ALL.len()]> =
