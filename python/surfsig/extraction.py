@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import enum
-import operator
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
 from surfsig._surfsig import Frame
+from surfsig.arguments import places_of, positive, queries, thread_count
 from surfsig.defaults import AXES, SIGNATURE_BLOCK, Axes
 from surfsig.errors import InvalidInputError
-from surfsig.point_cloud import PointCloud, coordinate_array, position_array
+from surfsig.point_cloud import PointCloud, position_array
 from surfsig.similarity import SIGNATURE, similarity
 
-FloatArray = NDArray[np.float32]
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
 
-LENGTHS = (1e-18, 1e18)
-"""What a radius or voxel may be: beyond, its square leaves float32."""
+FloatArray = NDArray[np.float32]
 
 
 class Status(enum.IntEnum):
@@ -110,6 +111,46 @@ class Extraction:
         ok: NDArray[np.bool_] = self.status == Status.OK
         return ok
 
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Name all values of the places, as files and tables call them.
+
+        Returns
+        -------
+        (m,) arrays: k1, k2, gaussian_curvature, mean_curvature, nx, ny, nz, direction_x, direction_y,
+        direction_z, residual, condition, count, status, linearity, planarity, scattering.
+        """
+        columns: dict[str, NDArray[Any]] = {"k1": self.k1, "k2": self.k2}
+        columns |= {"gaussian_curvature": self.gaussian_curvature, "mean_curvature": self.mean_curvature}
+        for letter, vectors in (("n", self.normals), ("direction_", self.directions)):
+            columns |= {letter + axis: vectors[:, i] for i, axis in enumerate("xyz")}
+        names = ("residual", "condition", "count", "status", "linearity", "planarity", "scattering")
+        return columns | {name: getattr(self, name) for name in names}
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Give x, y, z and `columns` as a pandas DataFrame, whose index has the points' numbers (`indices`).
+
+        Raises
+        ------
+        InvalidInputError
+            If pandas is not installed.
+        """
+        from surfsig.convert.pandas import data_frame
+
+        return data_frame(PointCloud(self.points), self.columns(), self.indices)
+
+    def to_arrow(self) -> pa.Table:
+        """Give x, y, z and `columns` as a PyArrow table, with radius and axes in its metadata.
+
+        Raises
+        ------
+        InvalidInputError
+            If PyArrow is not installed.
+        """
+        from surfsig.convert.arrow import table
+
+        notes = {"radius": repr(self.radius), "axes": self.axes}
+        return table(PointCloud(self.points), self.columns(), notes)
+
     def status_counts(self) -> dict[str, int]:
         """Return how many places have each status, by its name in lower case; none that has none."""
         counts = np.bincount(self.status, minlength=len(Status))
@@ -167,7 +208,7 @@ class Extraction:
         InvalidInputError
             If `at` is no set of places, or `flat_atom` is not a finite number above 0.
         """
-        places = _places(at, len(self))
+        places = places_of(at, len(self))
         frame = Frame.default() if frame is None else frame
         side = 2.0 * self.radius
         if self.coefficients is None:
@@ -261,7 +302,8 @@ def extract(
     Parameters
     ----------
     cloud
-        A `PointCloud`, or an array (n, 3) of numbers. Points that are not finite belong to no ball.
+        A `PointCloud`, an array (n, 3) of numbers, or any other that `PointCloud.of` takes (Open3D, pandas,
+        ...). Points that are not finite belong to no ball.
     radius
         Radius of the ball around each place, in the cloud's own unit; half the side D of the paper's
         patch. Finite and above 0.
@@ -291,8 +333,8 @@ def extract(
     InvalidInputError
         If an argument has no meaning; its text says which.
     """
-    cloud = cloud if isinstance(cloud, PointCloud) else PointCloud(coordinate_array(cloud))
-    radius = _positive(radius, "radius")
+    cloud = PointCloud.of(cloud)
+    radius = positive(radius, "radius")
     if axes not in ("surface", "sensor"):
         raise InvalidInputError(f"axes must be 'surface' or 'sensor', not {axes!r}")
     if at is not None and voxel is not None:
@@ -302,13 +344,13 @@ def extract(
     indices: NDArray[np.int64] | None
     query: NDArray[np.uint32] | NDArray[np.float64] | None
     if voxel is not None:
-        query = _surfsig.voxel_representatives(cloud.offsets, origin=origin, voxel=_positive(voxel, "voxel"))
+        query = _surfsig.voxel_representatives(cloud.offsets, origin=origin, voxel=positive(voxel, "voxel"))
         indices, points = query.astype(np.int64), cloud.points[query]
     elif at is None:
         query, points = None, cloud.points
         indices = np.arange(len(cloud))
     else:
-        query, indices = _queries(at, len(cloud))
+        query, indices = queries(at, len(cloud))
         points = query if indices is None else cloud.points[indices]
     arrays = _surfsig.extract(
         cloud.offsets,
@@ -317,72 +359,9 @@ def extract(
         axes=axes,
         at=query,
         viewpoint=None if sensor is None else sensor.tolist(),
-        threads=_threads(threads),
+        threads=thread_count(threads),
         progress=progress,
     )
     return Extraction(
         radius=radius, axes=axes, oriented=sensor is not None, points=points, indices=indices, **arrays
     )
-
-
-def _positive(value: float, what: str) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidInputError(f"{what} must be a finite number, not {value!r:.40}") from None
-    if not (np.isfinite(number) and number > 0):
-        raise InvalidInputError(f"{what} must be a finite number above 0, not {number:g}")
-    if not LENGTHS[0] <= number <= LENGTHS[1]:
-        raise InvalidInputError(f"{what} must be from {LENGTHS[0]:g} to {LENGTHS[1]:g}, not {number:g}")
-    return number
-
-
-def _threads(threads: int | None) -> int | None:
-    if threads is None:
-        return None
-    try:
-        number = operator.index(threads)
-    except TypeError:
-        raise InvalidInputError(f"threads must be a whole number, not {threads!r}") from None
-    if not 1 <= number <= 1024:
-        raise InvalidInputError(f"threads must be 1 to 1024, not {number}")
-    return number
-
-
-def _queries(
-    at: ArrayLike, count: int
-) -> tuple[NDArray[np.uint32] | NDArray[np.float64], NDArray[np.int64] | None]:
-    """Return what the core takes, and the points' numbers where they are points."""
-    try:
-        array = np.asarray(at)
-    except ValueError:
-        raise InvalidInputError("at must be places (m, 3); its rows differ in length") from None
-    if array.ndim == 2:
-        return coordinate_array(array, "at").astype(np.float64), None
-    indices = _places(array, count).astype(np.int64)
-    return indices.astype(np.uint32), indices
-
-
-def _places(at: ArrayLike | None, count: int) -> NDArray[np.int64]:
-    """Return numbers of places from numbers, of which negative ones count from the end, or a mask."""
-    if at is None:
-        return np.arange(count)
-    array = np.asarray(at)
-    if array.dtype == np.bool_:
-        if array.shape != (count,):
-            raise InvalidInputError(f"at: a mask must have the shape ({count},), not {array.shape}")
-        return np.flatnonzero(array)
-    if array.size == 0:
-        return np.zeros(0, np.int64)
-    if array.ndim != 1 or array.dtype.kind not in "iu":
-        raise InvalidInputError(
-            f"at must be whole numbers (m,), a mask, or places (m, 3), not {array.dtype} {array.shape}"
-        )
-    # Before unsigned numbers can wrap round.
-    if array.dtype.kind == "u" and array.max() >= count:
-        raise InvalidInputError(f"at: index {array.max()} is outside a cloud of {count} points")
-    numbers = array.astype(np.int64)
-    wrong = (numbers < -count) | (numbers >= count)
-    if wrong.any():
-        raise InvalidInputError(f"at: index {numbers[wrong][0]} is outside a cloud of {count} points")
-    return np.where(numbers < 0, numbers + count, numbers)

@@ -104,7 +104,7 @@ def extract_command(
         )
     clock.append(time.perf_counter())
     status = result.status.copy()
-    columns = _columns(result, status)
+    columns: dict[str, ArrayLike] = {**result.columns(), "status": status}
     if like is not None:
         columns["zeta"] = _similarity_to(like, cloud, result, viewpoint)
     with progress_bar("writing", "points", shown=shown) as progress:
@@ -138,17 +138,6 @@ def _part_of(cloud: PointCloud, result: Extraction) -> PointCloud:
     chosen = result.indices
     fields = {} if chosen is None else {name: values[chosen] for name, values in cloud.fields.items()}
     return PointCloud(result.points, viewpoint=cloud.viewpoint, fields=fields)
-
-
-def _columns(result: Extraction, status: NDArray[np.uint8]) -> dict[str, ArrayLike]:
-    columns: dict[str, ArrayLike] = {
-        name: getattr(result, name)
-        for name in ("k1", "k2", "gaussian_curvature", "mean_curvature", "normals")
-    }
-    columns |= {f"direction_{axis}": result.directions[:, i] for i, axis in enumerate("xyz")}
-    columns |= {"residual": result.residual, "condition": result.condition, "count": result.count}
-    columns |= {"status": status}
-    return columns | {name: getattr(result, name) for name in ("linearity", "planarity", "scattering")}
 
 
 def _similarity_to(

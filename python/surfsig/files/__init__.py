@@ -138,7 +138,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 def write(
     path: str | os.PathLike[str],
-    cloud: PointCloud,
+    cloud: PointCloud | ArrayLike,
     columns: Mapping[str, ArrayLike] | None = None,
     *,
     chunks: Chunks | tuple[str, int, object, object] | None = None,
@@ -154,7 +154,8 @@ def write(
     path
         The file; ``.ply``, ``.npz`` or ``.parquet``.
     cloud
-        Its points come first (in PLY as double where float would change one of them), then its fields.
+        Its points come first (in PLY as double where float would change one of them), then its fields. Or
+        what else `PointCloud.of` takes.
     columns
         (n,) or (n, k) numbers by name. ``normals`` (n, 3) are written as nx, ny, nz and ``colors`` (n, 3 or
         4) as red, green, blue (and alpha). In PLY any other (n, k) column becomes NAME_0, NAME_1, ...; in NPZ
@@ -174,6 +175,7 @@ def write(
         If a column has the wrong length or type, or the extension is none that can be written.
     """
     path = Path(path)
+    cloud = PointCloud.of(cloud)
     kind, writer = formats.of_output(path)
     block_column = None if chunks is None else Chunks(*chunks)  # type: ignore[arg-type]
     taken = set(kind.reserved)

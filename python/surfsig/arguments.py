@@ -1,0 +1,79 @@
+"""Checks of arguments that several functions take."""
+
+from __future__ import annotations
+
+import operator
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfsig.errors import InvalidInputError
+from surfsig.point_cloud import coordinate_array
+
+LENGTHS = (1e-18, 1e18)
+"""What a radius or voxel may be: beyond, its square leaves float32."""
+
+
+def positive(value: float, what: str) -> float:
+    """Check a length; an `InvalidInputError` says what `what` lacks."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidInputError(f"{what} must be a finite number, not {value!r:.40}") from None
+    if not (np.isfinite(number) and number > 0):
+        raise InvalidInputError(f"{what} must be a finite number above 0, not {number:g}")
+    if not LENGTHS[0] <= number <= LENGTHS[1]:
+        raise InvalidInputError(f"{what} must be from {LENGTHS[0]:g} to {LENGTHS[1]:g}, not {number:g}")
+    return number
+
+
+def thread_count(threads: int | None) -> int | None:
+    """Check a number of threads: None for all cores, or 1 to 1024."""
+    if threads is None:
+        return None
+    try:
+        number = operator.index(threads)
+    except TypeError:
+        raise InvalidInputError(f"threads must be a whole number, not {threads!r}") from None
+    if not 1 <= number <= 1024:
+        raise InvalidInputError(f"threads must be 1 to 1024, not {number}")
+    return number
+
+
+def queries(
+    at: ArrayLike, count: int
+) -> tuple[NDArray[np.uint32] | NDArray[np.float64], NDArray[np.int64] | None]:
+    """Return what the core takes, and the points' numbers where they are points."""
+    try:
+        array = np.asarray(at)
+    except ValueError:
+        raise InvalidInputError("at must be places (m, 3); its rows differ in length") from None
+    if array.ndim == 2:
+        return coordinate_array(array, "at").astype(np.float64), None
+    indices = places_of(array, count).astype(np.int64)
+    return indices.astype(np.uint32), indices
+
+
+def places_of(at: ArrayLike | None, count: int) -> NDArray[np.int64]:
+    """Return numbers of places from numbers, of which negative ones count from the end, or a mask."""
+    if at is None:
+        return np.arange(count)
+    array = np.asarray(at)
+    if array.dtype == np.bool_:
+        if array.shape != (count,):
+            raise InvalidInputError(f"at: a mask must have the shape ({count},), not {array.shape}")
+        return np.flatnonzero(array)
+    if array.size == 0:
+        return np.zeros(0, np.int64)
+    if array.ndim != 1 or array.dtype.kind not in "iu":
+        raise InvalidInputError(
+            f"at must be whole numbers (m,), a mask, or places (m, 3), not {array.dtype} {array.shape}"
+        )
+    # Before unsigned numbers can wrap round.
+    if array.dtype.kind == "u" and array.max() >= count:
+        raise InvalidInputError(f"at: index {array.max()} is outside a cloud of {count} points")
+    numbers = array.astype(np.int64)
+    wrong = (numbers < -count) | (numbers >= count)
+    if wrong.any():
+        raise InvalidInputError(f"at: index {numbers[wrong][0]} is outside a cloud of {count} points")
+    return np.where(numbers < 0, numbers + count, numbers)
