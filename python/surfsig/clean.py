@@ -180,7 +180,7 @@ def _finite_part(cloud: PointCloud) -> PointCloud:
 
 
 def _groups(steps: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Give the voxels numbers in the order of their first points: those points' numbers, and each point's voxel.
+    """Give the number of each voxel's first point, ascending, and each point's voxel in that order.
 
     The order in which a sort leaves equal keys, which differs between processors, shows in neither.
     """

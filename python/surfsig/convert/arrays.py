@@ -39,6 +39,8 @@ def _processor_array(data: Any) -> NDArray[Any]:
     speaks_numpy = hasattr(data, "__array__") or hasattr(data, "__array_interface__")
     try:
         device = data.__dlpack_device__()[0] if hasattr(data, "__dlpack_device__") else None
+        # Open3D answers with an enumeration, which equals no number.
+        device = getattr(device, "value", device)
         foreign = device not in (None, *_PROCESSOR_MEMORY)
         if foreign or (not speaks_numpy and hasattr(data, "__cuda_array_interface__")):
             raise InvalidInputError(f"{kind} lies on a GPU: copy it to the CPU first (PyTorch: x.cpu())")
