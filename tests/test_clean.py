@@ -180,6 +180,8 @@ def test_outliers_of_small_and_odd_clouds() -> None:
         assert len(surfsig.remove_outliers(np.arange(3.0 * count).reshape(count, 3))) == count
     huge = 1e30 * scan(300, 3)
     assert len(surfsig.remove_outliers(huge)) == len(surfsig.remove_outliers(scan(300, 3)))
+    with pytest.raises(InvalidInputError, match="coordinates must be within 1e\\+150"):
+        surfsig.remove_outliers(1e200 * scan(300, 3))
 
 
 @pytest.mark.parametrize(
@@ -187,8 +189,9 @@ def test_outliers_of_small_and_odd_clouds() -> None:
     [
         ({"neighbors": 0}, "neighbors must be 1 or more, not 0"),
         ({"neighbors": 2.5}, "neighbors must be a whole number"),
-        ({"std_ratio": -1}, "std_ratio must be 0 or more, not -1"),
-        ({"std_ratio": float("nan")}, "std_ratio must be 0 or more, not nan"),
+        ({"std_ratio": -1}, "std_ratio must be a finite number from 0 on, not -1"),
+        ({"std_ratio": float("nan")}, "std_ratio must be a finite number from 0 on, not nan"),
+        ({"std_ratio": float("inf")}, "std_ratio must be a finite number from 0 on, not inf"),
         ({"threads": 0}, "threads must be 1 to 1024"),
     ],
 )
