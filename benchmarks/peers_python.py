@@ -70,7 +70,7 @@ def jakteristics_features(cloud: Cloud, radius: float, threads: int) -> Timed:
 
 def small_gicp_covariances(cloud: Cloud, radius: float, threads: int) -> Timed:
     """Time small_gicp's normals and covariances from as many nearest points as a ball holds on average."""
-    import small_gicp  # type: ignore[import-not-found]
+    import small_gicp
 
     points = small_gicp.PointCloud(cloud)
     tree = small_gicp.KdTree(points, num_threads=threads)

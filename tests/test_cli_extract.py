@@ -18,7 +18,8 @@ from surfsig.point_cloud import PointCloud
 RADIUS = 0.05
 COLUMNS = [
     *("k1", "k2", "gaussian_curvature", "mean_curvature", "nx", "ny", "nz"),
-    *("direction_x", "direction_y", "direction_z", "residual", "condition", "count", "status"),
+    *("direction_x", "direction_y", "direction_z", "mean_curvature_std", "k1_std", "k2_std", "noise"),
+    *("residual", "condition", "count", "status"),
     *("linearity", "planarity", "scattering"),
 ]
 

@@ -90,7 +90,6 @@ def test_a_radius_out_of_range_is_told_the_range(points: Array, radius: float) -
         "scan.ply",
         [[1, 2, 3], [1, 2]],
         np.zeros((9, 3), "M8[s]"),
-        np.zeros(9, [("x", "f4"), ("y", "f4"), ("z", "f4")]),
         {"x": 1},
     ],
     ids=repr,

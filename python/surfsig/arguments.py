@@ -42,6 +42,11 @@ def whole_number(value: int, what: str, most: int) -> int:
     return number
 
 
+def thread_count(threads: int | None) -> int | None:
+    """Check a number of threads, 1 to 1024; None stays None and means all cores."""
+    return None if threads is None else whole_number(threads, "threads", 1024)
+
+
 def query_places(
     at: ArrayLike, count: int
 ) -> tuple[NDArray[np.uint32] | NDArray[np.float64], NDArray[np.int64] | None]:

@@ -15,6 +15,12 @@ RADIUS = 0.02
 SIGNATURE_BLOCK = 65_536
 """Signatures that a stream makes at a time: 60 MB."""
 
+OUTLIER_NEIGHBORS = 20
+"""Nearest points that `surfsig.remove_outliers` measures the distance to."""
+
+OUTLIER_STD_RATIO = 2.0
+"""Standard deviations above the mean from which on it calls a point an outlier; Open3D's examples use it."""
+
 FLAT_ATOM_NOISES = 2.576 * math.sqrt(2.0) / math.acos(0.9)
 """Length of the flat atom, in lengths of a signature of pure noise: 8.1.
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from surfsig.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
 
 
 def coordinate_array(points: ArrayLike, name: str = "points") -> NDArray[Any]:
@@ -119,6 +123,95 @@ class PointCloud:
             if height < 0 or width < 0 or height * width != len(self):
                 raise InvalidInputError(f"a grid of {height} x {width} does not hold {len(self)} points")
             self.grid = (height, width)
+
+    @classmethod
+    def of(cls, data: object) -> PointCloud:
+        """Take a point cloud from another library, without copying it where the memory can be shared.
+
+        Functions that take a cloud (`surfsig.extract`, ...) take these objects as they are. What shares its
+        memory changes with it, and must not be resized or freed as long as the result is used.
+
+        Parameters
+        ----------
+        data
+            One of:
+
+            - a `PointCloud`, which is returned itself;
+            - an array (n, 3) of any library that knows NumPy's protocols or DLPack (PyTorch, JAX, ...);
+            - a structured array, pandas DataFrame or Arrow table (PyArrow, Polars, ...) with x, y, z in any
+              case, or ``points`` (n, 3); the other columns of numbers become fields;
+            - a point cloud of Open3D, legacy or tensor; normals become the fields nx, ny, nz, and colours
+              red, green, blue (uint8).
+
+            Shared are C-contiguous coordinates in float32 or float64; ``points`` of Arrow where they are
+            in one chunk and none is missing.
+
+        Raises
+        ------
+        InvalidInputError
+            If there are no coordinates in it, or it lies on a GPU.
+        """
+        if isinstance(data, PointCloud):
+            return data
+        from surfsig.convert import cloud_of
+
+        return cloud_of(data)
+
+    def to_open3d(self, *, tensor: bool = False) -> Any:
+        """Give the cloud to Open3D.
+
+        Parameters
+        ----------
+        tensor
+            Whether to make an ``open3d.t.geometry.PointCloud``, which holds all fields and shares the
+            points' memory, or an ``open3d.geometry.PointCloud`` (float64), which holds normals and colours.
+
+        Returns
+        -------
+        The fields nx, ny, nz are its normals, and red, green, blue (uint8) its colours. It knows no
+        viewpoint and no grid.
+
+        Raises
+        ------
+        InvalidInputError
+            If Open3D is not installed.
+        """
+        from surfsig.convert.open3d import point_cloud
+
+        return point_cloud(self, tensor=tensor)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Give x, y, z and the fields as a pandas DataFrame; (n, k) fields become NAME_0, NAME_1, ...
+
+        Raises
+        ------
+        InvalidInputError
+            If pandas is not installed.
+        """
+        from surfsig.convert.pandas import data_frame
+
+        return data_frame(self)
+
+    def to_arrow(self) -> pa.Table:
+        """Give x, y, z and the fields as a PyArrow table, with viewpoint and grid in its metadata.
+
+        (n, k) fields become lists of k numbers. The table is the one that `surfsig.write` writes to Parquet.
+
+        Raises
+        ------
+        InvalidInputError
+            If PyArrow is not installed.
+        """
+        from surfsig.convert.arrow import table
+
+        return table(self)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """Give `points` to NumPy: ``numpy.asarray(cloud)``."""
+        points = self.points
+        if copy is False and (points is not self.offsets or dtype not in (None, points.dtype)):
+            raise ValueError("the points cannot be given without a copy")
+        return np.array(points, dtype) if copy else np.asarray(points, dtype)
 
     def __len__(self) -> int:
         """Count the points, those that are not finite included."""

@@ -55,6 +55,7 @@ QUANTILES = (0.05, 0.5, 0.95)
 )
 @threads_option
 @json_option
+@click.option("--robust", is_flag=True, help="Leave out points that are far from the fitted surface.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress and no summary.")
 def extract_command(
     file: Path,
@@ -69,14 +70,15 @@ def extract_command(
     viewpoint: tuple[float, float, float] | None,
     threads: int | None,
     as_json: bool,
+    robust: bool,
     quiet: bool,
 ) -> None:
     """Write the points of FILE with their signed curvature, normals and quality.
 
     The output has the input's points and fields, and k1, k2, gaussian_curvature, mean_curvature (per unit of
-    length; a bump seen from the sensor is positive), nx ny nz, direction_x _y _z (along k1), residual,
-    condition, count, status (0 is ok), linearity, planarity, scattering; zeta with --like. NaN where there is
-    no value.
+    length; a bump seen from the sensor is positive), nx ny nz, direction_x _y _z (along k1), the standard
+    errors mean_curvature_std, k1_std, k2_std, noise, residual, condition, count, status (0 is ok), linearity,
+    planarity, scattering; zeta with --like; radius with --neighbors. NaN where there is no value.
 
     \b
     Examples:
@@ -107,13 +109,14 @@ def extract_command(
             at=np.array(at) if at else None,
             voxel=voxel,
             viewpoint=viewpoint,
+            robust=robust,
             threads=threads,
             progress=progress,
         )
     clock.append(time.perf_counter())
     typical = float(np.median(result.radius)) if len(result) else np.nan
     status = result.status.copy()
-    columns = _columns(result, status)
+    columns: dict[str, ArrayLike] = {**result.columns(), "status": status}
     if like is not None:
         columns["zeta"] = _similarity_to(like, cloud, result, radius, neighbors, viewpoint)
     with progress_bar("writing", "points", shown=shown) as progress:
@@ -158,17 +161,6 @@ def _part_of(cloud: PointCloud, result: Extraction) -> PointCloud:
     chosen = result.indices
     fields = {} if chosen is None else {name: values[chosen] for name, values in cloud.fields.items()}
     return PointCloud(result.points, viewpoint=cloud.viewpoint, fields=fields)
-
-
-def _columns(result: Extraction, status: NDArray[np.uint8]) -> dict[str, ArrayLike]:
-    columns: dict[str, ArrayLike] = {
-        name: getattr(result, name)
-        for name in ("k1", "k2", "gaussian_curvature", "mean_curvature", "normals")
-    }
-    columns |= {f"direction_{axis}": result.directions[:, i] for i, axis in enumerate("xyz")}
-    columns |= {"residual": result.residual, "condition": result.condition, "count": result.count}
-    columns |= {"status": status}
-    return columns | {name: getattr(result, name) for name in ("linearity", "planarity", "scattering")}
 
 
 def _similarity_to(

@@ -138,7 +138,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 def write(
     path: str | os.PathLike[str],
-    cloud: PointCloud,
+    cloud: PointCloud | ArrayLike,
     columns: Mapping[str, ArrayLike] | None = None,
     *,
     chunks: Chunks | tuple[str, int, object, object] | None = None,
@@ -155,7 +155,8 @@ def write(
         The file; ``.ply``, ``.las``, ``.laz``, ``.npz`` or ``.parquet``.
     cloud
         Its points come first (in PLY as double where float would change one of them; in LAS and LAZ rounded
-        to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields.
+        to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields. Or
+        what else `PointCloud.of` takes.
     columns
         (n,) or (n, k) numbers by name. ``normals`` (n, 3) are written as nx, ny, nz and ``colors`` (n, 3 or
         4) as red, green, blue (and alpha). Any other (n, k) column stays one in NPZ and Parquet, and becomes
@@ -183,6 +184,7 @@ def write(
         If points that are not finite are left out (LAS and LAZ).
     """
     path = Path(path)
+    cloud = PointCloud.of(cloud)
     kind, writer = formats.of_output(path)
     block_column = None if chunks is None else Chunks(*chunks)  # type: ignore[arg-type]
     taken = set(kind.reserved)

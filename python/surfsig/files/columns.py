@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from surfsig.errors import FileFormatError, InvalidInputError
+from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
 from surfsig.point_cloud import PointCloud
 
 # Coordinates printed as text and declared float32 stay float64 where float32 would move a point by more than
@@ -52,8 +53,11 @@ def cloud_from_columns(
     viewpoint: ArrayLike | None = None,
     grid: tuple[int, int] | None = None,
     declared_float32: bool = False,
+    error: type[SurfsigError] = FileFormatError,
 ) -> PointCloud:
-    """Make a cloud of named columns: x, y, z in any case, the others as its fields.
+    """Make a cloud of named columns: x, y, z in any case, or `points` (n, 3); the others are its fields.
+
+    Coordinates that lie in memory as (n, 3) are not copied.
 
     Parameters
     ----------
@@ -66,28 +70,39 @@ def cloud_from_columns(
     declared_float32
         The coordinates were parsed as float64 from text that declares float32: narrow them where that
         loses nothing that matters (see `LOSS_ALLOWED`).
-
-    Raises
-    ------
-    FileFormatError
-        If a coordinate is missing.
+    error
+        What is raised if a coordinate is missing or no number.
     """
     by_lower_name = {name.lower(): name for name in reversed(list(columns))}
+    points = columns.get(by_lower_name.get("points", ""))
+    if (
+        points is not None
+        and points.ndim == 2
+        and points.shape[1] == 3
+        and not by_lower_name.keys() & {*"xyz"}
+    ):
+        rest = {name: values for name, values in columns.items() if name != by_lower_name["points"]}
+        columns = {**dict(zip("xyz", points.T, strict=True)), **rest}
+        by_lower_name |= {axis: axis for axis in "xyz"}
     missing = [axis for axis in "xyz" if axis not in by_lower_name]
     if missing:
-        raise FileFormatError(
+        raise error(
             f"{source}: no column '{missing[0]}' among the point's values ({', '.join(columns) or 'none'})"
         )
     axes = [by_lower_name[axis] for axis in "xyz"]
     first = columns[axes[0]]
     for axis in axes:
         if columns[axis].dtype.kind not in "fiu":
-            raise FileFormatError(f"{source}: column '{axis}' holds {columns[axis].dtype}, not real numbers")
+            raise error(f"{source}: column '{axis}' holds {columns[axis].dtype}, not real numbers")
     # Joining with float32 gives float32 to small types, and float64 to all that would lose digits.
     joint = np.result_type(np.float32, *(columns[axis].dtype for axis in axes))
-    offsets = np.empty((len(first), 3), np.float32 if joint == np.float32 else np.float64)
-    for i, axis in enumerate(axes):
-        offsets[:, i] = columns[axis]
+    shared = _shared_rows(*(columns[axis] for axis in axes))
+    if shared is None:
+        offsets = np.empty((len(first), 3), np.float32 if joint == np.float32 else np.float64)
+        for i, axis in enumerate(axes):
+            offsets[:, i] = columns[axis]
+    else:
+        offsets = shared
     if declared_float32:
         offsets = _narrowed(offsets)
     others = {name: _native(values) for name, values in columns.items() if name not in axes}
@@ -243,6 +258,36 @@ def with_colours(fields: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
         named.get(name, name): values.astype(np.uint8, copy=False) if name in named else values
         for name, values in fields.items()
     }
+
+
+def numeric_columns(rows: NDArray[Any], source: str) -> dict[str, NDArray[Any]]:
+    """Give a structured array's (n,) fields of numbers, as (n, k) where they have further axes.
+
+    Warns
+    -----
+    UserWarning
+        If a field holds no numbers.
+    """
+    names = rows.dtype.names or ()
+    numeric = [name for name in names if rows.dtype[name].base.kind in "fiub"]
+    for name in sorted(set(names) - set(numeric)):
+        warnings.warn(f"{source}: left out the field '{name}', which holds no numbers", stacklevel=3)
+    return {
+        name: rows[name].reshape(len(rows), -1) if rows[name].ndim > 1 else rows[name] for name in numeric
+    }
+
+
+def _shared_rows(x: NDArray[Any], y: NDArray[Any], z: NDArray[Any]) -> NDArray[Any] | None:
+    """Give three columns as the C-contiguous (n, 3) array that they are columns of; None if they are not."""
+    step = x.dtype.itemsize
+    start = x.ctypes.data
+    if not (x.dtype == y.dtype == z.dtype and x.dtype.isnative and x.dtype in (np.float32, np.float64)):
+        return None
+    if len(x) < 2 or any(column.strides != (3 * step,) for column in (x, y, z)):
+        return None
+    if (y.ctypes.data, z.ctypes.data) != (start + step, start + 2 * step):
+        return None
+    return np.lib.stride_tricks.as_strided(x, (len(x), 3), (3 * step, step), writeable=x.flags.writeable)
 
 
 def _narrowed(offsets: NDArray[Any]) -> NDArray[Any]:

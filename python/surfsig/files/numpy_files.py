@@ -16,7 +16,13 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError, InvalidInputError
-from surfsig.files.columns import Chunks, aligned_blocks, blocks_of, cloud_from_columns
+from surfsig.files.columns import (
+    Chunks,
+    aligned_blocks,
+    blocks_of,
+    cloud_from_columns,
+    numeric_columns,
+)
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
@@ -200,16 +206,7 @@ def _cloud_from_array(array: NDArray[Any], source: str) -> PointCloud:
             raise FileFormatError(
                 f"{source}: a structured array must have one axis, not the shape {array.shape}"
             )
-        numeric = [name for name in array.dtype.names if array.dtype[name].base.kind in "fiub"]
-        for name in sorted(set(array.dtype.names) - set(numeric)):
-            warnings.warn(f"{source}: left out the field '{name}', which holds no numbers", stacklevel=2)
-        return cloud_from_columns(
-            {
-                name: array[name].reshape(len(array), -1) if array[name].ndim > 1 else array[name]
-                for name in numeric
-            },
-            source=source,
-        )
+        return cloud_from_columns(numeric_columns(array, source), source=source)
     if array.dtype.kind not in "fiu":
         raise FileFormatError(f"{source}: points must be real numbers, not {array.dtype}")
     if array.ndim != 2 or array.shape[1] < 3:
