@@ -20,6 +20,9 @@ COLUMNS: dict[str, tuple[Any, tuple[int, ...]]] = {
     "directions": (c_float, (3,)),
     "residual": (c_float, ()),
     "condition": (c_float, ()),
+    "mean_curvature_std": (c_float, ()),
+    "k1_std": (c_float, ()),
+    "k2_std": (c_float, ()),
     "count": (c_uint32, ()),
     "status": (c_uint8, ()),
     "linearity": (c_float, ()),
@@ -42,6 +45,8 @@ class Options:
     axes: int | None = None
     viewpoint: Any = None
     threads: int | None = None
+    neighbors: int | None = None
+    robust: bool = False
     indices: NDArray[np.uint32] | None = None
 
 
@@ -76,6 +81,10 @@ class CInterface:
                 self.check(f.surfsig_options_set_axes(made, c_int(values.axes)))
             if values.viewpoint is not None:
                 self.check(f.surfsig_options_set_viewpoint(made, (c_double * 3)(*values.viewpoint)))
+            if values.neighbors is not None:
+                self.check(f.surfsig_options_set_neighbors(made, c_uint32(values.neighbors)))
+            if values.robust:
+                self.check(f.surfsig_options_set_robust(made, c_int(1)))
             if values.threads is not None:
                 self.check(f.surfsig_options_set_threads(made, c_uint32(values.threads)))
             if (indices := values.indices) is not None:

@@ -175,6 +175,26 @@ def test_values_at_any_stride(c: CInterface, points: NDArray[np.float32], stride
     c.functions.surfsig_extraction_free(made)
 
 
+@pytest.mark.parametrize("axes", [0, 1])
+def test_the_nearest_of_a_ball_without_outliers(
+    c: CInterface, points: NDArray[np.float32], axes: int
+) -> None:
+    options = Options(axes=axes, neighbors=30, robust=True)
+    made = c.extract(address(points), len(points), 12, RADIUS, options=options)
+    expected = surfsig.extract(
+        points,
+        RADIUS,
+        neighbors=30,
+        robust=True,
+        axes=("surface", "sensor")[axes],
+    )
+    assert (expected.count <= 30).all()
+    assert_equal_columns(c.columns(made), expected)
+    rows, _ = c.signatures(made, None, len(points))
+    np.testing.assert_array_equal(rows, expected.signatures())
+    c.functions.surfsig_extraction_free(made)
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_values_with_an_origin(c: CInterface, points: NDArray[np.float32], dtype: Any) -> None:
     offsets = points.astype(dtype)

@@ -15,7 +15,8 @@ from surfsig import InvalidInputError, PointCloud
 POINTS = np.array([[0, 1, 2], [3, 4, 5], [6, 7, np.nan], [9, 10, 11]], np.float32)
 COLUMNS = [
     *("k1", "k2", "gaussian_curvature", "mean_curvature", "nx", "ny", "nz"),
-    *("direction_x", "direction_y", "direction_z", "residual", "condition", "count", "status"),
+    *("direction_x", "direction_y", "direction_z", "mean_curvature_std", "k1_std", "k2_std", "noise"),
+    *("residual", "condition", "count", "status"),
     *("linearity", "planarity", "scattering"),
 ]
 

@@ -183,9 +183,8 @@ class Extraction:
         """
         from surfsig.convert.arrow import table
 
-        notes: dict[str, str] = {"axes": self.axes}
-        if isinstance(self.radius, float):
-            notes["radius"] = repr(self.radius)
+        fixed = {"radius": repr(self.radius)} if isinstance(self.radius, float) else {}
+        notes = {**fixed, "axes": str(self.axes)}
         return table(PointCloud(self.points), self.columns(), notes)
 
     def status_counts(self) -> dict[str, int]:

@@ -218,6 +218,22 @@ const float *surfsig_extraction_residual(const surfsig_extraction *extraction);
 const float *surfsig_extraction_condition(const surfsig_extraction *extraction);
 
 /**
+ * Standard error of (k1 + k2) / 2, (size) floats; NaN in the sensor's axes and where no more than six
+ * points are in the ball.
+ */
+const float *surfsig_extraction_mean_curvature_std(const surfsig_extraction *extraction);
+
+/**
+ * Standard error of k1, (size) floats; right where k1 and k2 differ significantly.
+ */
+const float *surfsig_extraction_k1_std(const surfsig_extraction *extraction);
+
+/**
+ * Standard error of k2, (size) floats.
+ */
+const float *surfsig_extraction_k2_std(const surfsig_extraction *extraction);
+
+/**
  * Points in the ball, the place itself included, (size) numbers.
  */
 const uint32_t *surfsig_extraction_count(const surfsig_extraction *extraction);
@@ -277,6 +293,23 @@ surfsig_code surfsig_options_set_viewpoint(surfsig_options *options, const doubl
  * @param threads 1 to 1024; 0 for all cores.
  */
 surfsig_code surfsig_options_set_threads(surfsig_options *options, uint32_t threads);
+
+/**
+ * Counts only the nearest of the points within the radius.
+ *
+ * @param options The options to change.
+ * @param neighbors At most this many, the place itself included; 0 for all of them.
+ */
+surfsig_code surfsig_options_set_neighbors(surfsig_options *options, uint32_t neighbors);
+
+/**
+ * Leaves out points farther from the fitted surface than three standard deviations of the others, and
+ * fits again, until the choice stands; the count is then that of the points that stay.
+ *
+ * @param options The options to change.
+ * @param robust 1 to do so, 0 (the default) not to.
+ */
+surfsig_code surfsig_options_set_robust(surfsig_options *options, int robust);
 
 /**
  * Chooses the points at which curvature is asked for; the others are neighbours only. An index that the

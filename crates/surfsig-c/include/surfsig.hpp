@@ -41,6 +41,10 @@ public:
   Options &threads(std::uint32_t threads) {
     return checked(surfsig_options_set_threads(handle_.get(), threads));
   }
+  Options &neighbors(std::uint32_t most) {
+    return checked(surfsig_options_set_neighbors(handle_.get(), most));
+  }
+  Options &robust(bool robust) { return checked(surfsig_options_set_robust(handle_.get(), robust ? 1 : 0)); }
   Options &indices(const std::vector<std::uint32_t> &indices) {
     return checked(surfsig_options_set_indices(handle_.get(), indices.data(), indices.size()));
   }
@@ -83,6 +87,11 @@ public:
   Column<float> directions() const { return {surfsig_extraction_directions(get()), 3 * size()}; }
   Column<float> residual() const { return {surfsig_extraction_residual(get()), size()}; }
   Column<float> condition() const { return {surfsig_extraction_condition(get()), size()}; }
+  Column<float> mean_curvature_std() const {
+    return {surfsig_extraction_mean_curvature_std(get()), size()};
+  }
+  Column<float> k1_std() const { return {surfsig_extraction_k1_std(get()), size()}; }
+  Column<float> k2_std() const { return {surfsig_extraction_k2_std(get()), size()}; }
   Column<std::uint32_t> count() const { return {surfsig_extraction_count(get()), size()}; }
   Column<surfsig_status> status() const { return {surfsig_extraction_status(get()), size()}; }
   Column<float> linearity() const { return {surfsig_extraction_linearity(get()), size()}; }

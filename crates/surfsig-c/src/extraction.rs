@@ -5,7 +5,7 @@ use crate::code::{Failure, guarded, surfsig_code};
 use crate::options::{position, surfsig_options};
 use crate::status::surfsig_status;
 use std::borrow::Cow;
-use surfsig::{Extraction, Monitor, Offsets, PointCloud, Radius, extract_monitored};
+use surfsig::{Extraction, Monitor, Neighborhood, Offsets, PointCloud, Radius, extract_monitored};
 
 /// What an extraction gives: columns of one length, in the order of the places. Made by
 /// surfsig_extract_f32() or surfsig_extract_f64(), freed by surfsig_extraction_free(). It refers to
@@ -96,7 +96,11 @@ unsafe fn extract<T: Copy>(
         let options = options.unwrap_or(&default);
         let cloud = PointCloud { offsets: offsets(&rows), origin };
         let monitor = Monitor::default();
-        let found = extract_monitored(&cloud, radius, &options.queries(), &options.extract, &monitor)?;
+        let around = match options.neighbors {
+            None => Neighborhood::Ball(radius),
+            Some(most) => Neighborhood::Hybrid { radius, most },
+        };
+        let found = extract_monitored(&cloud, around, &options.queries(), &options.extract, &monitor)?;
         let made = Box::new(surfsig_extraction { found, threads: options.extract.threads });
         // SAFETY: as above.
         unsafe { extraction.write(Box::into_raw(made)) };
@@ -158,6 +162,27 @@ pub extern "C" fn surfsig_extraction_residual(extraction: Option<&surfsig_extrac
 #[unsafe(no_mangle)]
 pub extern "C" fn surfsig_extraction_condition(extraction: Option<&surfsig_extraction>) -> *const f32 {
     column(extraction, |found| &found.condition)
+}
+
+/// Standard error of (k1 + k2) / 2, (size) floats; NaN in the sensor's axes and where no more than six
+/// points are in the ball.
+#[unsafe(no_mangle)]
+pub extern "C" fn surfsig_extraction_mean_curvature_std(
+    extraction: Option<&surfsig_extraction>,
+) -> *const f32 {
+    column(extraction, |found| &found.mean_curvature_std)
+}
+
+/// Standard error of k1, (size) floats; right where k1 and k2 differ significantly.
+#[unsafe(no_mangle)]
+pub extern "C" fn surfsig_extraction_k1_std(extraction: Option<&surfsig_extraction>) -> *const f32 {
+    column(extraction, |found| &found.k1_std)
+}
+
+/// Standard error of k2, (size) floats.
+#[unsafe(no_mangle)]
+pub extern "C" fn surfsig_extraction_k2_std(extraction: Option<&surfsig_extraction>) -> *const f32 {
+    column(extraction, |found| &found.k2_std)
 }
 
 /// Points in the ball, the place itself included, (size) numbers.

@@ -25,6 +25,8 @@ const SENSOR: c_int = surfsig_axes::Sensor as c_int;
 #[derive(Default)]
 pub struct surfsig_options {
     pub extract: ExtractOptions<'static>,
+    /// Of the points within the radius, at most so many, the nearest.
+    pub neighbors: Option<usize>,
     indices: Option<Vec<u32>>,
 }
 
@@ -98,6 +100,37 @@ pub extern "C" fn surfsig_options_set_threads(
             return Err(Failure::invalid_input(format!("threads must be 0 to {MAX_THREADS}, not {threads}")));
         }
         present(options)?.extract.threads = (threads > 0).then_some(threads as usize);
+        Ok(())
+    })
+}
+
+/// Counts only the nearest of the points within the radius.
+///
+/// @param options The options to change.
+/// @param neighbors At most this many, the place itself included; 0 for all of them.
+#[unsafe(no_mangle)]
+pub extern "C" fn surfsig_options_set_neighbors(
+    options: Option<&mut surfsig_options>,
+    neighbors: u32,
+) -> surfsig_code {
+    guarded(|| {
+        present(options)?.neighbors = (neighbors > 0).then_some(neighbors as usize);
+        Ok(())
+    })
+}
+
+/// Leaves out points farther from the fitted surface than three standard deviations of the others, and
+/// fits again, until the choice stands; the count is then that of the points that stay.
+///
+/// @param options The options to change.
+/// @param robust 1 to do so, 0 (the default) not to.
+#[unsafe(no_mangle)]
+pub extern "C" fn surfsig_options_set_robust(
+    options: Option<&mut surfsig_options>,
+    robust: c_int,
+) -> surfsig_code {
+    guarded(|| {
+        present(options)?.extract.robust = robust != 0;
         Ok(())
     })
 }

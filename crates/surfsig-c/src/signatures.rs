@@ -65,14 +65,24 @@ fn within(last: Option<usize>, found: &Extraction) -> Result<(), Failure> {
 
 /// Fills the rows, and marks in `statuses`, which hold the fits' own, what the frame does not reach.
 fn fill(found: &Extraction, places: &[usize], rows: &mut [[f32; SIGNATURE]], statuses: &mut [Status]) {
-    let (frame, side) = (Frame::shared(), 2.0 * found.radius);
+    let frame = Frame::shared();
+    // In patch units a side is 1, where each place has its own radius.
+    let side = if found.radii.is_empty() { 2.0 * found.radius } else { 1.0 };
+    let unit = |i: usize| found.radii.get(i).map_or(1.0, |radius| 2.0 * radius);
     match found.axes {
         FitAxes::Surface => {
-            let curvatures: Vec<_> = places.iter().map(|&i| [found.k1[i], found.k2[i]]).collect();
+            let curvatures: Vec<_> =
+                places.iter().map(|&i| [found.k1[i] * unit(i), found.k2[i] * unit(i)]).collect();
             frame.signatures_of_curvatures(side, &curvatures, rows, statuses);
         }
         FitAxes::Sensor => {
-            let surfaces: Vec<_> = places.iter().map(|&i| found.coefficients[i]).collect();
+            let surfaces: Vec<_> = places
+                .iter()
+                .map(|&i| {
+                    let ([a, b, c, d, e, f], unit) = (found.coefficients[i], unit(i));
+                    [a * unit, b * unit, c, d, e * unit, f / unit]
+                })
+                .collect();
             frame.signatures_of_surfaces(side, &surfaces, rows, statuses);
         }
     }
