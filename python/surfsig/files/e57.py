@@ -96,9 +96,8 @@ def _points(columns: dict[str, NDArray[Any]], where: str) -> NDArray[Any]:
             if not np.isnan(turned[missing]).all():
                 points = np.where(missing[:, None], turned, points)
     if points is None:
-        raise FileFormatError(
-            f"{where} has no coordinates among the point's values ({', '.join(columns) or 'none'})"
-        )
+        names = ", ".join(list(columns)[:8]) or "none"
+        raise FileFormatError(f"{where} has no coordinates among the point's values ({names})")
     return points
 
 

@@ -72,7 +72,7 @@ def record_names(columns: Mapping[str, NDArray[Any]]) -> dict[str, str]:
         if not standard.issuperset(group):
             standard.difference_update(group)
     for field, about in _FLAGS.items():
-        if field in standard and (about not in standard or not is_flag(columns[field])):
+        if field in standard and (about not in standard or not _is_flag(columns[field])):
             standard.discard(field)
     # Some readers, ours among them, look at a name without its prefix.
     taken = {name.partition(":")[2] or name for name in _FIELDS}
@@ -92,6 +92,5 @@ def record_names(columns: Mapping[str, NDArray[Any]]) -> dict[str, str]:
     return given
 
 
-def is_flag(values: NDArray[Any]) -> bool:
-    """Tell whether there are only whole numbers 0 and 1."""
+def _is_flag(values: NDArray[Any]) -> bool:
     return values.dtype.kind in "iub" and bool(np.isin(values, (0, 1)).all())

@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 from surfsig import _surfsig
 from surfsig.errors import InvalidInputError
 from surfsig.files.columns import Chunks, aligned_blocks, column_names, exact_float32, scalar_columns
-from surfsig.files.e57_names import EXTENSIONS, is_flag, record_names
+from surfsig.files.e57_names import EXTENSIONS, record_names
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
 _BLOCK_ROWS = 1 << 16
 _AXES = ("cartesianX", "cartesianY", "cartesianZ")
 _INVALID = 2
+# What other programs expect of flags and colours, whatever type they have here.
+_LIMITS = (("is", 1), ("color", 255))
 _LARGEST = np.iinfo(np.int64).max
 
 
@@ -147,8 +149,11 @@ def _exact_float32(cloud: PointCloud, scan: _Scan) -> bool:
 def _record(name: str, values: NDArray[Any]) -> _Record:
     if values.dtype.kind == "f":
         return _Record(name, "f4" if values.dtype.itemsize <= 4 else "f8")
-    if values.dtype.kind == "b" or (name.startswith("is") and is_flag(values)):
+    if values.dtype.kind == "b":
         return _Record(name, "i8", 0, 1)
+    for prefix, highest in _LIMITS:
+        if name.startswith(prefix) and len(values) and values.min() >= 0 and values.max() <= highest:
+            return _Record(name, "i8", 0, highest)
     limits = np.iinfo(values.dtype)
     if limits.max > _LARGEST and len(values) and int(values.max()) > _LARGEST:
         raise InvalidInputError(f"'{name}' has whole numbers above {_LARGEST}, for which E57 has no type")

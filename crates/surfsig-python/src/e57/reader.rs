@@ -7,13 +7,21 @@ use crate::python_file::PythonFile;
 use e57::{Error, PointCloud, Result};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::io::Seek;
 use std::sync::Mutex;
 
-/// The library unpacks a whole packet (64 KiB) at once, whatever number of points is promised: for each
-/// column that needs no bits (all its values are equal) as many values as the other columns' bits give.
-const MAX_CONSTANT_COLUMNS: usize = 64;
+/// The library unpacks a whole packet (64 KiB) at once, however few points are promised: of each column that
+/// needs no bits, because all its values are equal, as many as the widest of the others has.
+const PACKET_BITS: u128 = 8 << 16;
+const MAX_CONSTANTS_PER_PACKET: u128 = 1 << 22;
 /// More values per byte of the file than any measurement has: it is a broken promise, or a trap.
 const MAX_VALUES_PER_BYTE: u128 = 64;
+
+const MAX_COLUMNS: usize = 4096;
+/// The XML parser's time grows with the square of an element's attributes, and with the cube of the
+/// namespaces that are declared one inside the other.
+const MAX_ATTRIBUTES: usize = 1 << 14;
+const MAX_NAMESPACES: usize = 1 << 10;
 
 /// A scan's rotation (a quaternion, w first) and translation into the file's frame.
 type Pose = ([f64; 4], [f64; 3]);
@@ -32,9 +40,10 @@ impl E57Reader {
     #[new]
     fn new(py: Python<'_>, file: Py<PyAny>, source: String, progress: Py<PyAny>) -> PyResult<Self> {
         let open = || {
-            let file = PythonFile::new(file, Some(progress))
-                .map_err(|error| Error::Read { desc: "seeking".to_owned(), source: Some(error.into()) })?;
+            let mut file = PythonFile::new(file, Some(progress)).map_err(seek_error)?;
             let size = file.len();
+            check_xml(&e57::E57Reader::raw_xml(&mut file)?)?;
+            file.rewind().map_err(seek_error)?;
             Ok((e57::E57Reader::new(file)?, size))
         };
         let (reader, size) = py.detach(|| guarded(open)).map_err(|error| failure(&error, &source))?;
@@ -94,13 +103,19 @@ impl E57Reader {
 
     /// The number of points, if the file is large enough for them.
     fn check_promise(&self, scan: &PointCloud) -> Result<usize> {
-        let widths = scan.prototype.iter().map(|record| bits(&record.data_type));
-        let point_bits: u128 = widths.clone().map(u128::from).sum();
-        let constant = widths.filter(|width| *width == 0).count();
+        let widths = scan.prototype.iter().map(|record| u128::from(bits(&record.data_type)));
+        let point_bits: u128 = widths.clone().sum();
+        let widest = widths.clone().max().unwrap_or(0);
+        let constant = widths.filter(|width| *width == 0).count() as u128;
         let (points, size) = (u128::from(scan.records), u128::from(self.size));
         let values = points * scan.prototype.len() as u128;
-        if constant > MAX_CONSTANT_COLUMNS {
-            return Error::invalid(format!("{constant} columns have the same value at all points"));
+        if scan.prototype.len() > MAX_COLUMNS
+            || constant * PACKET_BITS > MAX_CONSTANTS_PER_PACKET * widest.max(1)
+        {
+            return Error::invalid(format!(
+                "a point has {} values, {constant} of them the same everywhere",
+                scan.prototype.len()
+            ));
         }
         if points > 0
             && (point_bits == 0 || points * point_bits > size * 8 || values > size * MAX_VALUES_PER_BYTE)
@@ -111,6 +126,22 @@ impl E57Reader {
         }
         Ok(scan.records as usize)
     }
+}
+
+/// Refuses an XML section that would keep its parser busy for minutes.
+fn check_xml(xml: &[u8]) -> Result<()> {
+    let namespaces = xml.windows(5).filter(|bytes| bytes == b"xmlns").count();
+    // What begins with an exclamation mark is text or a comment.
+    let elements = xml.split(|byte| *byte == b'<').filter(|element| !element.starts_with(b"!"));
+    let attributes = elements.map(|element| element.iter().filter(|byte| **byte == b'=').count()).max();
+    if namespaces > MAX_NAMESPACES || attributes.unwrap_or(0) > MAX_ATTRIBUTES {
+        return Error::invalid("its XML has too many namespaces or attributes");
+    }
+    Ok(())
+}
+
+fn seek_error(error: std::io::Error) -> Error {
+    Error::Read { desc: "seeking".to_owned(), source: Some(error.into()) }
 }
 
 fn failure(error: &Error, source: &str) -> PyErr {
