@@ -27,7 +27,7 @@ QUANTILES = (0.05, 0.5, 0.95)
 @click.command("extract", no_args_is_help=True)
 @click.argument("file", type=CLOUD)
 @click.option("--radius", type=float, required=True, help="Of the neighbourhood, in the file's unit.")
-@click.option("-o", "--output", type=CLOUD, required=True, help="A .ply, .npz or .parquet file.")
+@click.option("-o", "--output", type=CLOUD, required=True, help="A .ply, .e57, .npz or .parquet file.")
 @click.option("--signatures", is_flag=True, help="Write the signature of each point too (242 numbers).")
 @click.option(
     "--like",

@@ -35,7 +35,7 @@ def read(
     depth_scale: float | None = None,
     progress: ProgressCallback | None = None,
 ) -> PointCloud:
-    """Read a point cloud: PLY, PCD, text (XYZ, CSV, TXT, ASC), NPY, NPZ or Parquet.
+    """Read a point cloud: PLY, PCD, E57, text (XYZ, CSV, TXT, ASC), NPY, NPZ or Parquet.
 
     Parameters
     ----------
@@ -145,24 +145,27 @@ def write(
     notes: Mapping[str, str] | None = None,
     progress: ProgressCallback | None = None,
 ) -> None:
-    """Write a cloud with further columns: PLY (binary, little-endian), NPZ or Parquet, by the extension.
+    """Write a cloud with further columns: PLY (binary, little-endian), E57, NPZ or Parquet, by the extension.
 
     The file appears whole or not at all: a failure (a full disk) leaves an old file as it was.
 
     Parameters
     ----------
     path
-        The file; ``.ply``, ``.npz`` or ``.parquet``.
+        The file; ``.ply``, ``.e57``, ``.npz`` or ``.parquet``.
     cloud
-        Its points come first (in PLY as double where float would change one of them), then its fields.
+        Its points come first (in PLY and E57 as double where float would change one of them), then its
+        fields. In E57 its viewpoint, or its viewpoints, become the poses of its scans.
     columns
         (n,) or (n, k) numbers by name. ``normals`` (n, 3) are written as nx, ny, nz and ``colors`` (n, 3 or
-        4) as red, green, blue (and alpha). In PLY any other (n, k) column becomes NAME_0, NAME_1, ...; in NPZ
-        and Parquet it stays one. A field of the cloud with the same name is kept as ``input_NAME``.
+        4) as red, green, blue (and alpha). In PLY and E57 any other (n, k) column becomes
+        NAME_0, NAME_1, ...; in NPZ and Parquet it stays one. A field of the cloud with the same name is kept
+        as ``input_NAME``.
     chunks
         One more column, (n, width), given block by block so that it need not fit in memory.
     notes
-        Words about the whole file (PLY comments, Parquet metadata, the array ``notes`` of NPZ, as JSON).
+        Words about the whole file (PLY comments; as JSON in Parquet's metadata, the array ``notes`` of NPZ,
+        the description of an E57 scan).
     progress
         Called with the points written so far and their number.
 
@@ -172,6 +175,11 @@ def write(
         If the file cannot be written.
     InvalidInputError
         If a column has the wrong length or type, or the extension is none that can be written.
+
+    Warns
+    -----
+    UserWarning
+        If the viewpoints of several scans cannot be written, because their points are mixed (E57).
     """
     path = Path(path)
     kind, writer = formats.of_output(path)
