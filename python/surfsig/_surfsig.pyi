@@ -1,7 +1,7 @@
 """The compiled core: what it offers to the package."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, final
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, BinaryIO, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,12 @@ __all__ = [
     "INSTRUCTION_SET",
     "OPTIMAL",
     "STATUS_NAMES",
+    "E57Reader",
     "Frame",
     "__version__",
     "extract",
     "voxel_representatives",
+    "write_e57",
 ]
 
 __version__: str
@@ -40,6 +42,21 @@ def extract(
 def voxel_representatives(
     points: NDArray[np.floating], *, origin: Sequence[float], voxel: float
 ) -> NDArray[np.uint32]: ...
+def write_e57(
+    file: BinaryIO,
+    *,
+    guid: str,
+    description: str | None,
+    extensions: Sequence[tuple[str, str]],
+    records: Sequence[tuple[str, str, int, int]],
+    scans: Iterable[tuple[str, Sequence[float] | None, Iterable[Sequence[NDArray[Any]]]]],
+) -> None: ...
+
+@final
+class E57Reader:
+    def __new__(cls, file: BinaryIO, source: str, progress: Callable[[int], object]) -> E57Reader: ...
+    def __len__(self) -> int: ...
+    def scan(self, number: int) -> tuple[dict[str, NDArray[Any]], tuple[list[float], list[float]] | None]: ...
 
 @final
 class Frame:

@@ -1,7 +1,9 @@
 //! The bindings: release the interpreter, call the core, map the error; nothing else.
 
+mod e57;
 mod extract;
 mod frame;
+mod python_file;
 
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -14,8 +16,17 @@ fn to_python(error: surfsig::Error) -> PyErr {
 
 /// A `surfsig.InvalidInputError`.
 fn invalid_input(message: &str) -> PyErr {
+    error_of_class("InvalidInputError", message)
+}
+
+/// A `surfsig.FileFormatError`.
+fn file_format(message: &str) -> PyErr {
+    error_of_class("FileFormatError", message)
+}
+
+fn error_of_class(name: &str, message: &str) -> PyErr {
     Python::attach(|py| {
-        let class = py.import("surfsig.errors").and_then(|module| module.getattr("InvalidInputError"));
+        let class = py.import("surfsig.errors").and_then(|module| module.getattr(name));
         match class.and_then(|class| class.call1((PyString::new(py, message),))) {
             Ok(exception) => PyErr::from_value(exception),
             Err(failed) => failed,
@@ -36,6 +47,8 @@ fn rows<'a, T: numpy::Element, const N: usize>(array: &'a PyReadonlyArray2<'_, T
 /// The compiled core of surfsig.
 #[pymodule]
 mod _surfsig {
+    #[pymodule_export]
+    use crate::e57::{E57Reader, write_e57};
     #[pymodule_export]
     use crate::extract::{extract, voxel_representatives};
     #[pymodule_export]

@@ -36,7 +36,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     Yields
     ------
     BinaryIO
-        A buffered, seekable file open for writing.
+        A buffered, seekable file open for writing, and for reading what was written.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     target = _resolve(path)
     descriptor, temporary = _create_beside(target, path)
     try:
-        with os.fdopen(descriptor, "wb") as file:
+        with os.fdopen(descriptor, "w+b") as file:
             yield file
             file.flush()
             os.fsync(file.fileno())

@@ -29,7 +29,7 @@ class Chunks(NamedTuple):
     Attributes
     ----------
     name
-        Its name; in PLY, which knows single numbers only, `name_0`, `name_1`, ...
+        Its name; in PLY and E57, which know single numbers only, `name_0`, `name_1`, ...
     width
         Numbers per point.
     dtype

@@ -11,7 +11,7 @@ from typing import Any, BinaryIO, Protocol
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError, InvalidInputError
-from surfsig.files import las, las_write, numpy_files, parquet, pcd, ply, text
+from surfsig.files import e57, e57_writer, las, las_write, numpy_files, parquet, pcd, ply, text
 from surfsig.files.columns import Chunks
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
@@ -109,7 +109,7 @@ FORMATS = (
     ),
     Format("LAZ", (".laz",), _matches(las.LAZ_MAGIC), las.read, las_write.write_laz, takes=("box",)),
     Format("LAS", (".las",), _begins(las.MAGIC), las.read, las_write.write_las, takes=("box",)),
-    Format("E57", (".e57",), _begins(b"ASTM-E57")),
+    Format("E57", (".e57",), _begins(e57.MAGIC), e57.read, e57_writer.write, takes=("scan",)),
     Format("PNG image", (".png",), _begins(b"\x89PNG")),
     Format("JPEG image", (".jpg", ".jpeg"), _begins(b"\xff\xd8\xff")),
     Format("PDF", (".pdf",), _begins(b"%PDF")),
