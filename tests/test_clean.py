@@ -74,6 +74,7 @@ def test_fields_of_a_voxel() -> None:
         "green": np.array([255, 0, 255, 255], np.uint8),
         "blue": np.array([0, 0, 0, 1], np.uint8),
         "pair": np.array([[1.0, 2], [0, 0], [3, 4], [5, 9]]),
+        "none": np.zeros((4, 0)),
         "k1": np.array([1.0, 2.0, np.nan, 3.0], np.float32),
         "nx": np.array([1.0, 0, 0, 1.0], np.float32),
         "ny": np.array([0.0, 0, 1, 0], np.float32),
@@ -115,7 +116,7 @@ def test_voxels_at_far_coordinates_lose_nothing() -> None:
 
 def test_voxels_that_are_many_or_too_small() -> None:
     steps = np.array([[0, 0, 0], [1 << 40, 0, 5], [0, 1 << 40, 0], [1 << 40, 0, 5], [0, 0, 0]])
-    first, group = _groups(steps)
+    first, group = _groups(steps.T)
     assert first.tolist() == [0, 1, 2]
     assert group.tolist() == [0, 1, 2, 1, 0]
     with pytest.raises(InvalidInputError, match="voxel 1e-15 is too small"):
