@@ -167,6 +167,14 @@ def test_tables_that_are_no_cloud() -> None:
             PointCloud.of(table)
 
 
+def test_a_column_without_numbers_has_no_type_in_arrow(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    cloud = PointCloud(POINTS, fields={"none": np.zeros((4, 0))})
+    for give in (cloud.to_arrow, lambda: surfsig.write(tmp_path / "a.parquet", cloud)):
+        with pytest.raises(InvalidInputError, match=r"cannot hold a column \(n, 0\)"):
+            give()
+
+
 def test_columns_of_an_extraction(extraction: surfsig.Extraction) -> None:
     columns = extraction.columns()
     assert list(columns) == COLUMNS
