@@ -4,15 +4,16 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 OUT    ?= demo
+PREFIX ?= /usr/local
 
 # What the compiled module is made from; a change of any rebuilds it.
-SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
+SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help demo test lint format bench docs clean build
+.PHONY: help demo test lint format bench docs wheel check-wheel header install-c clean build
 .DEFAULT_GOAL := help
 
 help: ## Say what there is to make
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 demo: build ## Run the main job and draw it into demo/
 	$(BIN)/python examples/demo.py $(OUT)
@@ -42,6 +43,21 @@ bench: build ## Time surfsig and its peers in one run, and write BENCHMARKS.md
 docs: build ## Build the API reference: target/doc (Rust) and build/docs (Python)
 	cargo doc --workspace --no-deps
 	$(BIN)/python -m pdoc --docformat numpy --output-directory build/docs surfsig
+
+wheel: $(VENV)/.tools ## Build the wheel, for all Pythons from 3.10 on, into dist/
+	rm -rf dist
+	$(BIN)/maturin build --release --strip --out dist
+
+check-wheel: wheel ## Use the wheel in an empty environment of each Python at hand
+	$(BIN)/python scripts/check_distribution.py dist/*.whl
+
+header: ## Write the C header anew from the sources
+	SURFSIG_WRITE_HEADER=1 cargo test --package surfsig-c --test header --quiet
+
+install-c: ## Install the C and C++ interface: make install-c PREFIX=/usr/local
+	cmake -S crates/surfsig-c -B build/c
+	cmake --build build/c
+	cmake --install build/c --prefix $(PREFIX)
 
 clean: ## Remove everything that was built
 	rm -rf $(VENV) target build dist $(OUT)

@@ -61,7 +61,7 @@ def test_radii(shell: Callable[..., Any], ball: Path, tmp_path: Path, radius: st
     ("options", "message"),
     [
         (("--radius", "wide"), "'wide' is not a valid float"),
-        ((), "Missing option '--radius'"),
+        ((), "give a radius, or neighbors, or both"),
         (("--radius", 1, "--at", "1;2;3"), "not three numbers"),
         (("--radius", 1, "--at", "1,2,3", "--voxel", 1), "exclude each other"),
         (("--radius", 1, "--axes", "moon"), "'moon' is not one of"),

@@ -18,7 +18,8 @@ from surfsig.point_cloud import PointCloud
 RADIUS = 0.05
 COLUMNS = [
     *("k1", "k2", "gaussian_curvature", "mean_curvature", "nx", "ny", "nz"),
-    *("direction_x", "direction_y", "direction_z", "residual", "condition", "count", "status"),
+    *("direction_x", "direction_y", "direction_z", "mean_curvature_std", "k1_std", "k2_std", "noise"),
+    *("residual", "condition", "count", "status"),
     *("linearity", "planarity", "scattering"),
 ]
 
@@ -220,3 +221,16 @@ def test_ctrl_c_keeps_the_old_output(tmp_path: Path) -> None:
     assert b"Traceback" not in shown
     assert out.read_bytes() == b"old"
     assert sorted(os.listdir(tmp_path)) == ["dense.ply", "out.ply"]
+
+
+def test_the_nearest_in_place_of_a_radius(shell: Callable[..., Any], ball: Path, tmp_path: Path) -> None:
+    out = tmp_path / "nearest.npz"
+    done = shell("extract", ball, "--neighbors", 40, "-o", out, "--like", "0,0,1.5", "--json")
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    assert (told["radius"], told["neighbors"]) == (None, 40)
+    arrays = np.load(out)
+    assert (arrays["count"] == 40).all()
+    # A ball of radius 0.5, seen from outside; the forty nearest of its points are within 0.06.
+    assert np.median(arrays["k2"]) == pytest.approx(2, rel=0.02)
+    assert np.median(arrays["zeta"]) > 0.99

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from surface_points import UTM, Array, rotation, rough_surface
 
-from surfsig import Extraction, Status, extract
+from surfsig import Extraction, extract
 
 RADIUS = 0.3
 SEEDS = [11, 12, 13]
@@ -68,7 +68,7 @@ def test_fit_in_the_sensors_axes(seed: int) -> None:
     at = np.arange(0, len(points), 12)
     found = extract(points, RADIUS, at=at, axes="sensor")
     assert found.coefficients is not None
-    assert (found.status == Status.OK).all()
+    assert found.ok.all()
     for i, place in enumerate(points[at]):
         local = ball(points, place)
         coefficients, rms = fitted(local)
@@ -95,7 +95,7 @@ def test_fit_in_the_surfaces_own_axes(seed: int, origin: Array) -> None:
     for i, place in enumerate(points[at]):
         local = ball(points, place)
         reference = turned_until_flat(local)
-        if reference is None or found.status[i] != Status.OK:
+        if reference is None or not found.ok[i]:
             continue
         compared += 1
         axes, coefficients, rms = reference

@@ -59,7 +59,7 @@ def test_points_that_are_not_finite_belong_to_no_ball(axes: Any, bad: float, dty
         assert getattr(found, column)[kept].tobytes() == getattr(clean, column).tobytes(), column
     asked = extract(with_bad, 0.5, axes=axes, at=numbers)
     assert (asked.status == Status.NOT_FINITE).all()
-    assert found.status_counts() == {"ok": 300, "not_finite": 4}
+    assert found.ok.sum() == 300
     assert "not_finite: 4" in repr(found)
 
 
@@ -269,7 +269,7 @@ def test_the_status_numbers_are_those_of_the_core() -> None:
     from surfsig import _surfsig
 
     assert [status.name.lower() for status in Status] == _surfsig.STATUS_NAMES
-    assert [int(status) for status in Status] == list(range(6))
+    assert [int(status) for status in Status] == list(range(7))
 
 
 def test_an_edge_does_not_settle_and_keeps_its_last_values() -> None:

@@ -26,7 +26,7 @@ def rough() -> Extraction:
 
 
 def test_a_signature_is_that_of_its_curvatures_in_the_surfaces_axes(rough: Extraction) -> None:
-    at = np.flatnonzero(rough.ok)[:50]
+    at = np.flatnonzero(rough.status == Status.OK)[:50]
     rows, status = Frame.default().signatures_of_curvatures(rough.k1[at], rough.k2[at], side=0.6)
     found, found_status = rough.signatures(at, return_status=True)
     np.testing.assert_array_equal(found, rows)

@@ -11,8 +11,9 @@ surfsig.similarity(w[0], w[1])             # zeta, between 0 and 1
 
 from surfsig._surfsig import INSTRUCTION_SET, Frame, __version__
 from surfsig.clean import crop, downsample, remove_outliers
+from surfsig.curvature import extract
 from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
-from surfsig.extraction import Extraction, Status, extract
+from surfsig.extraction import Extraction, Status
 from surfsig.files import read, write
 from surfsig.flat_atom import flat_atom_length
 from surfsig.point_cloud import PointCloud

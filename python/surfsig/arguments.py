@@ -1,4 +1,4 @@
-"""Checks of arguments that several functions take."""
+"""Arguments of several functions, checked: each returns what it was given in the form that is worked with."""
 
 from __future__ import annotations
 
@@ -14,8 +14,12 @@ LENGTHS = (1e-18, 1e18)
 """What a radius or voxel may be: beyond, its square leaves float32."""
 
 
-def positive(value: float, what: str) -> float:
-    """Check a length; an `InvalidInputError` says what `what` lacks."""
+MOST_NEIGHBORS = 2**32 - 1
+"""Points are numbered with 32 bits."""
+
+
+def positive_length(value: float, what: str) -> float:
+    """Check a length: finite, above 0, and within what float32 can square."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
@@ -27,20 +31,23 @@ def positive(value: float, what: str) -> float:
     return number
 
 
-def thread_count(threads: int | None) -> int | None:
-    """Check a number of threads: None for all cores, or 1 to 1024."""
-    if threads is None:
-        return None
+def whole_number(value: int, what: str, most: int) -> int:
+    """Check a whole number from 1 to `most`."""
     try:
-        number = operator.index(threads)
+        number = operator.index(value)
     except TypeError:
-        raise InvalidInputError(f"threads must be a whole number, not {threads!r}") from None
-    if not 1 <= number <= 1024:
-        raise InvalidInputError(f"threads must be 1 to 1024, not {number}")
+        raise InvalidInputError(f"{what} must be a whole number, not {value!r:.40}") from None
+    if not 1 <= number <= most:
+        raise InvalidInputError(f"{what} must be 1 to {most}, not {number}")
     return number
 
 
-def queries(
+def thread_count(threads: int | None) -> int | None:
+    """Check a number of threads, 1 to 1024; None stays None and means all cores."""
+    return None if threads is None else whole_number(threads, "threads", 1024)
+
+
+def query_places(
     at: ArrayLike, count: int
 ) -> tuple[NDArray[np.uint32] | NDArray[np.float64], NDArray[np.int64] | None]:
     """Return what the core takes, and the points' numbers where they are points."""
@@ -50,11 +57,11 @@ def queries(
         raise InvalidInputError("at must be places (m, 3); its rows differ in length") from None
     if array.ndim == 2:
         return coordinate_array(array, "at").astype(np.float64), None
-    indices = places_of(array, count).astype(np.int64)
+    indices = place_numbers(array, count).astype(np.int64)
     return indices.astype(np.uint32), indices
 
 
-def places_of(at: ArrayLike | None, count: int) -> NDArray[np.int64]:
+def place_numbers(at: ArrayLike | None, count: int) -> NDArray[np.int64]:
     """Return numbers of places from numbers, of which negative ones count from the end, or a mask."""
     if at is None:
         return np.arange(count)

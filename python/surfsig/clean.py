@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfsig.arguments import positive, thread_count
+from surfsig.arguments import positive_length, thread_count
 from surfsig.convert.libraries import library
 from surfsig.defaults import OUTLIER_NEIGHBORS, OUTLIER_STD_RATIO
 from surfsig.errors import InvalidInputError
@@ -80,7 +80,7 @@ def downsample(cloud: PointCloud | ArrayLike, voxel: float) -> PointCloud:
         If the voxel is no length, or too small for the coordinates.
     """
     cloud = _finite_part(PointCloud.of(cloud))
-    edge = positive(voxel, "voxel")
+    edge = positive_length(voxel, "voxel")
     if not len(cloud):
         return cloud
     # An axis a row: along the short axis of (n, 3), NumPy is several times slower.

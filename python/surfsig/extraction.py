@@ -1,21 +1,22 @@
-"""From points to curvature and signatures: `extract` and its result."""
+"""What an extraction gives: curvature at every place, and signatures when asked for."""
 
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfsig import _surfsig
 from surfsig._surfsig import Frame
-from surfsig.arguments import places_of, positive, queries, thread_count
-from surfsig.defaults import AXES, SIGNATURE_BLOCK, Axes
+from surfsig.arguments import (
+    place_numbers,
+)
+from surfsig.defaults import SIGNATURE_BLOCK, Axes
 from surfsig.errors import InvalidInputError
-from surfsig.point_cloud import PointCloud, position_array
+from surfsig.point_cloud import PointCloud
 from surfsig.similarity import SIGNATURE, similarity
 
 if TYPE_CHECKING:
@@ -40,6 +41,9 @@ class Status(enum.IntEnum):
     """The surface's own axes did not settle; the values are those of the last turn (edges, corners)."""
     OUTSIDE_VOCABULARY = 5
     """More curved than any atom of the frame: curvature, but no signature."""
+    ONE_SIDED = 6
+    """The points lie mostly on one side of the place (a rim): all values are there, with larger standard
+    errors, and biased where the surface is no paraboloid."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,13 +53,15 @@ class Extraction:
     Lengths are in the cloud's own unit, curvatures per that unit. NaN stands where there is no value.
     """
 
-    radius: float
-    """Radius of the balls."""
+    radius: float | FloatArray
+    """Radius of the balls; with `neighbors` each place's own, (m,): the distance to the farthest point
+    that counts, or the radius asked for where there are no more points within it."""
     axes: Axes
     """Axes in which the paraboloids were fitted."""
     oriented: bool
-    """Whether a known viewpoint oriented the normals; otherwise their side, and with it the sign of
-    curvature, is a convention (z, else y, else x of the normal is positive)."""
+    """Whether a known viewpoint, or normals that came with the cloud, oriented the normals; otherwise
+    their side, and with it the sign of curvature, is a convention (z, else y, else x of the normal is
+    positive)."""
     points: NDArray[np.floating]
     """The places, (m, 3)."""
     indices: NDArray[np.int64] | None
@@ -72,6 +78,14 @@ class Extraction:
     """Root mean square of the points' heights above the fit, (m,)."""
     condition: FloatArray
     """At least this factor is on the standard error of the worst determined coefficient, (m,)."""
+    mean_curvature_std: FloatArray
+    """Standard error of the mean curvature, (m,), from the actual normal equations and the residual; NaN
+    in the sensor's axes, and where no more than six points are in the ball."""
+    k1_std: FloatArray
+    """Standard error of k1, (m,); where k1 and k2 do not differ significantly, they are biased apart by
+    0.7 to 0.8 of it, by nature."""
+    k2_std: FloatArray
+    """Standard error of k2, (m,)."""
     count: NDArray[np.uint32]
     """Points in the ball, (m,), the place itself included where it is a point of the cloud."""
     status: NDArray[np.uint8]
@@ -93,7 +107,8 @@ class Extraction:
     def __repr__(self) -> str:
         """Say what was extracted, and how it went."""
         counts = ", ".join(f"{name}: {n}" for name, n in self.status_counts().items())
-        return f"Extraction({len(self)} places, radius={self.radius:g}, axes={self.axes!r}, {counts})"
+        radius = f"{self.radius:g}" if isinstance(self.radius, float) else "its own"
+        return f"Extraction({len(self)} places, radius={radius}, axes={self.axes!r}, {counts})"
 
     @property
     def gaussian_curvature(self) -> FloatArray:
@@ -106,10 +121,17 @@ class Extraction:
         return 0.5 * (self.k1 + self.k2)
 
     @property
+    def noise(self) -> FloatArray:
+        """Standard deviation of a point's distance to the surface, (m,), from the residual and the count."""
+        count = self.count.astype(np.float32)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            freedom = np.where(count > 6, count - 6, np.nan)
+            return np.asarray(self.residual * np.sqrt(count / freedom), np.float32)
+
+    @property
     def ok(self) -> NDArray[np.bool_]:
-        """Where the status is `Status.OK`, (m,)."""
-        ok: NDArray[np.bool_] = self.status == Status.OK
-        return ok
+        """Where all values are there and mean what they say, (m,): `Status.OK` and `Status.ONE_SIDED`."""
+        return np.isin(self.status, (Status.OK, Status.ONE_SIDED))
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Name all values of the places, as files and tables call them.
@@ -117,13 +139,26 @@ class Extraction:
         Returns
         -------
         (m,) arrays: k1, k2, gaussian_curvature, mean_curvature, nx, ny, nz, direction_x, direction_y,
-        direction_z, residual, condition, count, status, linearity, planarity, scattering.
+        direction_z, mean_curvature_std, k1_std, k2_std, noise, residual, condition, count, status, linearity,
+        planarity, scattering; and radius where each place has its own.
         """
         columns: dict[str, NDArray[Any]] = {"k1": self.k1, "k2": self.k2}
         columns |= {"gaussian_curvature": self.gaussian_curvature, "mean_curvature": self.mean_curvature}
         for letter, vectors in (("n", self.normals), ("direction_", self.directions)):
             columns |= {letter + axis: vectors[:, i] for i, axis in enumerate("xyz")}
-        names = ("residual", "condition", "count", "status", "linearity", "planarity", "scattering")
+        names = [
+            "mean_curvature_std",
+            "k1_std",
+            "k2_std",
+            "noise",
+            "residual",
+            "condition",
+            "count",
+            "status",
+        ]
+        names += ["linearity", "planarity", "scattering"]
+        if not isinstance(self.radius, float):
+            names.insert(0, "radius")
         return columns | {name: getattr(self, name) for name in names}
 
     def to_pandas(self) -> pd.DataFrame:
@@ -148,7 +183,9 @@ class Extraction:
         """
         from surfsig.convert.arrow import table
 
-        notes = {"radius": repr(self.radius), "axes": self.axes}
+        notes: dict[str, str] = {"axes": self.axes}
+        if isinstance(self.radius, float):
+            notes["radius"] = repr(self.radius)
         return table(PointCloud(self.points), self.columns(), notes)
 
     def status_counts(self) -> dict[str, int]:
@@ -208,15 +245,9 @@ class Extraction:
         InvalidInputError
             If `at` is no set of places, or `flat_atom` is not a finite number above 0.
         """
-        places = places_of(at, len(self))
+        places = place_numbers(at, len(self))
         frame = Frame.default() if frame is None else frame
-        side = 2.0 * self.radius
-        if self.coefficients is None:
-            k1, k2 = np.ascontiguousarray(self.k1[places]), np.ascontiguousarray(self.k2[places])
-            rows, status = frame.signatures_of_curvatures(k1, k2, side=side)
-        else:
-            surfaces = np.ascontiguousarray(self.coefficients[places])
-            rows, status = frame.signatures_of_surfaces(surfaces, side=side)
+        rows, status = self._signatures(places, frame)
         if flat_atom is not None:
             if not (np.isfinite(flat_atom) and flat_atom > 0):
                 raise InvalidInputError(f"flat_atom must be a finite number above 0, not {flat_atom}")
@@ -228,6 +259,23 @@ class Extraction:
         # The fit's own status says more, but for places that it left in order.
         fitted = self.status[places]
         return rows, np.where(status == Status.OK, fitted, status).astype(np.uint8)
+
+    def _signatures(self, places: NDArray[np.int64], frame: Frame) -> tuple[FloatArray, NDArray[np.uint8]]:
+        side, curvatures, surfaces = 1.0, (self.k1[places], self.k2[places]), self.coefficients
+        surfaces = None if surfaces is None else surfaces[places]
+        if isinstance(self.radius, float):
+            side = 2 * self.radius
+        else:
+            # In patch units a side is 1, so that each place may have its own.
+            sides = 2 * self.radius[places]
+            curvatures = (curvatures[0] * sides, curvatures[1] * sides)
+            if surfaces is not None:
+                one = np.ones_like(sides)
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    surfaces = surfaces * np.column_stack([sides, sides, one, one, sides, 1 / sides])
+        if surfaces is None:
+            return frame.signatures_of_curvatures(*curvatures, side=side)
+        return frame.signatures_of_surfaces(surfaces, side=side)
 
     def iter_signatures(
         self, *, frame: Frame | None = None, flat_atom: float | None = None, block: int = SIGNATURE_BLOCK
@@ -284,84 +332,3 @@ class Extraction:
         for places, rows, _ in self.iter_signatures(frame=frame, flat_atom=flat_atom):
             zeta[places] = similarity(rows, reference, either_side=either_side)
         return zeta
-
-
-def extract(
-    cloud: PointCloud | ArrayLike,
-    radius: float,
-    *,
-    axes: Axes = AXES,
-    at: ArrayLike | None = None,
-    voxel: float | None = None,
-    viewpoint: ArrayLike | None = None,
-    threads: int | None = None,
-    progress: Callable[[int, int], object] | None = None,
-) -> Extraction:
-    """Extract curvature from the points within a radius: eq. (5), and from it k1, k2, K and H.
-
-    Parameters
-    ----------
-    cloud
-        A `PointCloud`, an array (n, 3) of numbers, or any other that `PointCloud.of` takes (Open3D, pandas,
-        ...). Points that are not finite belong to no ball.
-    radius
-        Radius of the ball around each place, in the cloud's own unit; half the side D of the paper's
-        patch. Finite and above 0.
-    axes
-        "surface": the paraboloid's height runs along its own normal, and the result turns with the
-        object. "sensor": along z, as the paper fits; z runs away from the sensor.
-    at
-        Where: numbers of points (m,), or places of their own (m, 3); every point by default.
-    voxel
-        In place of `at`: one point of each voxel of this size, the one nearest to the mean of the
-        voxel's points.
-    viewpoint
-        Where the sensor stood, (3,), in the cloud's coordinates; by default what the cloud says. It
-        orients the normals, and with them the sign of curvature.
-    threads
-        Number of threads; all cores by default. The result is the same, bit for bit.
-    progress
-        Called with the number of places done and their total, some twenty times a second.
-
-    Returns
-    -------
-    Extraction
-        One struct of arrays, in the order of the places.
-
-    Raises
-    ------
-    InvalidInputError
-        If an argument has no meaning; its text says which.
-    """
-    cloud = PointCloud.of(cloud)
-    radius = positive(radius, "radius")
-    if axes not in ("surface", "sensor"):
-        raise InvalidInputError(f"axes must be 'surface' or 'sensor', not {axes!r}")
-    if at is not None and voxel is not None:
-        raise InvalidInputError("at and voxel exclude each other")
-    sensor = cloud.viewpoint if viewpoint is None else position_array(viewpoint, "viewpoint")
-    origin: Sequence[float] = cloud.origin.tolist()
-    indices: NDArray[np.int64] | None
-    query: NDArray[np.uint32] | NDArray[np.float64] | None
-    if voxel is not None:
-        query = _surfsig.voxel_representatives(cloud.offsets, origin=origin, voxel=positive(voxel, "voxel"))
-        indices, points = query.astype(np.int64), cloud.points[query]
-    elif at is None:
-        query, points = None, cloud.points
-        indices = np.arange(len(cloud))
-    else:
-        query, indices = queries(at, len(cloud))
-        points = query if indices is None else cloud.points[indices]
-    arrays = _surfsig.extract(
-        cloud.offsets,
-        origin=origin,
-        radius=radius,
-        axes=axes,
-        at=query,
-        viewpoint=None if sensor is None else sensor.tolist(),
-        threads=thread_count(threads),
-        progress=progress,
-    )
-    return Extraction(
-        radius=radius, axes=axes, oriented=sensor is not None, points=points, indices=indices, **arrays
-    )

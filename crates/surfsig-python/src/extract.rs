@@ -7,7 +7,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
-use surfsig::{ExtractOptions, Extraction, FitAxes, Monitor, Offsets, PointCloud, Queries, Radius};
+use surfsig::{
+    ExtractOptions, Extraction, FitAxes, Monitor, Neighborhood, Offsets, PointCloud, Queries, Radius,
+};
 
 /// How often the interpreter is asked for signals and told the progress.
 const WATCH_INTERVAL: Duration = Duration::from_millis(50);
@@ -36,18 +38,32 @@ pub enum At<'py> {
     Positions(PyReadonlyArray2<'py, f64>),
 }
 
+/// Which points around a place count, from what the caller gave of radius and number.
+fn neighborhood(radius: Option<f64>, neighbors: Option<usize>) -> PyResult<Neighborhood> {
+    let radius = radius.map(Radius::new).transpose().map_err(to_python)?;
+    match (radius, neighbors) {
+        (Some(radius), Some(most)) => Ok(Neighborhood::Hybrid { radius, most }),
+        (Some(radius), None) => Ok(Neighborhood::Ball(radius)),
+        (None, Some(k)) => Ok(Neighborhood::Nearest(k)),
+        (None, None) => Err(PyValueError::new_err("neither radius nor neighbors")),
+    }
+}
+
 /// Extract curvature; see `surfsig.extract` for what the arguments and the arrays mean.
 #[pyfunction]
-#[pyo3(signature = (points, *, origin, radius, axes, at=None, viewpoint=None, threads=None, progress=None))]
+#[pyo3(signature = (points, *, origin, radius, axes, neighbors=None, at=None, viewpoint=None, directions=None, robust=false, threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
 pub fn extract<'py>(
     py: Python<'py>,
     points: Points<'py>,
     origin: [f64; 3],
-    radius: f64,
+    radius: Option<f64>,
     axes: &str,
+    neighbors: Option<usize>,
     at: Option<At<'py>>,
     viewpoint: Option<[f64; 3]>,
+    directions: Option<PyReadonlyArray2<'py, f32>>,
+    robust: bool,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
@@ -62,11 +78,12 @@ pub fn extract<'py>(
         "sensor" => FitAxes::Sensor,
         other => return Err(PyValueError::new_err(format!("unknown axes '{other}'"))),
     };
-    let radius = Radius::new(radius).map_err(to_python)?;
-    let options = ExtractOptions { axes, viewpoint, threads, instruction_set: None };
+    let neighborhood = neighborhood(radius, neighbors)?;
+    let directions = directions.as_ref().map(rows::<f32, 3>).transpose()?;
+    let options = ExtractOptions { axes, viewpoint, directions, robust, threads, instruction_set: None };
     let monitor = Monitor::default();
     let total = queries.len(&cloud);
-    let run = || surfsig::extract_monitored(&cloud, radius, &queries, &options, &monitor);
+    let run = || surfsig::extract_monitored(&cloud, neighborhood, &queries, &options, &monitor);
     let report = || -> PyResult<()> {
         Python::attach(|py| {
             py.check_signals()?;
@@ -111,12 +128,18 @@ fn to_arrays(py: Python<'_>, extraction: Extraction) -> PyResult<Bound<'_, PyDic
         Ok(PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])?.into_any())
     }
     let arrays = PyDict::new(py);
+    if !extraction.radii.is_empty() {
+        arrays.set_item("radius", extraction.radii.into_pyarray(py))?;
+    }
     arrays.set_item("k1", extraction.k1.into_pyarray(py))?;
     arrays.set_item("k2", extraction.k2.into_pyarray(py))?;
     arrays.set_item("normals", matrix(py, extraction.normals)?)?;
     arrays.set_item("directions", matrix(py, extraction.directions)?)?;
     arrays.set_item("residual", extraction.residual.into_pyarray(py))?;
     arrays.set_item("condition", extraction.condition.into_pyarray(py))?;
+    arrays.set_item("mean_curvature_std", extraction.mean_curvature_std.into_pyarray(py))?;
+    arrays.set_item("k1_std", extraction.k1_std.into_pyarray(py))?;
+    arrays.set_item("k2_std", extraction.k2_std.into_pyarray(py))?;
     arrays.set_item("count", extraction.count.into_pyarray(py))?;
     let status: Vec<u8> = extraction.status.into_iter().map(|status| status as u8).collect();
     arrays.set_item("status", status.into_pyarray(py))?;

@@ -4,10 +4,10 @@
 //! affair: moments today, a robust re-weighting or a pooled descriptor as well. A [`MomentSource`]
 //! gives the 35 sums of a ball, whichever way it comes by them.
 
+use crate::block_sums::BlockSums;
 use crate::cell_index::{CellIndex, Row, RowKey};
 use crate::moments::{Moments, Scalar};
 use crate::simd::InstructionSet;
-use crate::simd::accumulate::accumulate;
 use crate::simd::select::{BLOCK, Ball, Block, PADDING, Place, Rows, Window, gather};
 
 /// Sees every point of a ball once, in the order of the lattice.
@@ -56,7 +56,7 @@ struct NearRow {
 /// Walks over the points themselves: the plain way, and the reference of every other.
 pub(crate) struct DirectWalk<'a> {
     index: &'a CellIndex,
-    set: InstructionSet,
+    pub set: InstructionSet,
     scale: f32,
     /// The present row, so that coming back to it costs nothing.
     row: Option<RowKey>,
@@ -174,8 +174,7 @@ impl MomentSource for DirectWalk<'_> {
     }
 
     fn moments<S: Scalar>(&mut self, offset: [f32; 3]) -> Moments<f64> {
-        let mut sums =
-            BlockSums::<S> { set: self.set, total: Moments::default(), scalar: std::marker::PhantomData };
+        let mut sums = BlockSums::<S>::new(self.set);
         self.visit(offset, &mut sums);
         sums.total
     }
@@ -204,24 +203,6 @@ fn seek(x: &[f32], range: std::ops::Range<usize>, from: usize, before: impl Fn(f
         low = probe;
     }
     low + x[low..high].partition_point(|&v| before(v))
-}
-
-/// The visitor that sums: blocks in `S`, their totals in `f64`.
-struct BlockSums<S> {
-    set: InstructionSet,
-    total: Moments<f64>,
-    scalar: std::marker::PhantomData<S>,
-}
-
-impl<S: Scalar> BallVisitor for BlockSums<S> {
-    const WANTS_RANKS: bool = false;
-
-    fn visit(&mut self, block: &Block, len: usize) {
-        let sums = accumulate::<S>(self.set, block, len);
-        for (total, sum) in self.total.sums.iter_mut().zip(sums) {
-            *total += sum.to_f64();
-        }
-    }
 }
 
 #[cfg(test)]

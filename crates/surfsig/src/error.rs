@@ -30,6 +30,17 @@ pub enum Error {
         /// The number of points.
         len: usize,
     },
+    /// A neighbourhood of no points.
+    #[error("at least one neighbour must be asked for")]
+    NoNeighbors,
+    /// A direction must be given for every query, or for none.
+    #[error("{directions} directions for {queries} queries")]
+    DirectionsMismatch {
+        /// The number of directions.
+        directions: usize,
+        /// The number of queries.
+        queries: usize,
+    },
     /// More points than 32-bit ranks can number.
     #[error("a cloud of {0} points is too large: at most 4294967295 are numbered; cut it into tiles")]
     TooManyPoints(usize),

@@ -29,12 +29,14 @@
 //! ([`FitAxes`]) -> curvature ([`Paraboloid`]) -> [`Frame`] -> [`similarity`]; [`extract()`] walks it.
 
 mod ball;
+mod block_sums;
 mod cell_index;
 mod curvature;
 mod error;
 mod extract;
 mod fit;
 mod frame;
+mod members;
 mod moments;
 mod point_cloud;
 mod simd;
@@ -45,7 +47,8 @@ pub use cell_index::CellIndex;
 pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
 pub use error::Error;
 pub use extract::{
-    ExtractOptions, Extraction, Monitor, Queries, Status, extract, extract_monitored, voxel_representatives,
+    ExtractOptions, Extraction, Monitor, Neighborhood, Queries, Status, extract, extract_monitored,
+    voxel_representatives,
 };
 pub use fit::FitAxes;
 pub use frame::{Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};

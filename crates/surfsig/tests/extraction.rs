@@ -40,7 +40,7 @@ fn radius(length: f64) -> Radius {
     Radius::new(length).unwrap()
 }
 
-fn above() -> ExtractOptions {
+fn above() -> ExtractOptions<'static> {
     ExtractOptions { viewpoint: Some([0.0, 0.0, 50.0]), ..ExtractOptions::default() }
 }
 

@@ -26,8 +26,14 @@ QUANTILES = (0.05, 0.5, 0.95)
 
 @click.command("extract", no_args_is_help=True)
 @click.argument("file", type=CLOUD)
-@click.option("--radius", type=float, required=True, help="Of the neighbourhood, in the file's unit.")
-@click.option("-o", "--output", type=CLOUD, required=True, help="A .ply, .npz or .parquet file.")
+@click.option("--radius", type=float, help="Of the neighbourhood, in the file's unit.")
+@click.option(
+    "--neighbors",
+    type=int,
+    metavar="K",
+    help="In place of --radius, the K nearest points; with --radius, at most so many of those within it.",
+)
+@click.option("-o", "--output", type=CLOUD, required=True, help="A .ply, .las, .laz, .npz or .parquet file.")
 @click.option("--signatures", is_flag=True, help="Write the signature of each point too (242 numbers).")
 @click.option(
     "--like",
@@ -49,10 +55,12 @@ QUANTILES = (0.05, 0.5, 0.95)
 )
 @threads_option
 @json_option
+@click.option("--robust", is_flag=True, help="Leave out points that are far from the fitted surface.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress and no summary.")
 def extract_command(
     file: Path,
-    radius: float,
+    radius: float | None,
+    neighbors: int | None,
     output: Path,
     signatures: bool,
     like: tuple[float, float, float] | None,
@@ -62,14 +70,15 @@ def extract_command(
     viewpoint: tuple[float, float, float] | None,
     threads: int | None,
     as_json: bool,
+    robust: bool,
     quiet: bool,
 ) -> None:
     """Write the points of FILE with their signed curvature, normals and quality.
 
     The output has the input's points and fields, and k1, k2, gaussian_curvature, mean_curvature (per unit of
-    length; a bump seen from the sensor is positive), nx ny nz, direction_x _y _z (along k1), residual,
-    condition, count, status (0 is ok), linearity, planarity, scattering; zeta with --like. NaN where there is
-    no value.
+    length; a bump seen from the sensor is positive), nx ny nz, direction_x _y _z (along k1), the standard
+    errors mean_curvature_std, k1_std, k2_std, noise, residual, condition, count, status (0 is ok), linearity,
+    planarity, scattering; zeta with --like; radius with --neighbors. NaN where there is no value.
 
     \b
     Examples:
@@ -95,40 +104,54 @@ def extract_command(
         result = surfsig.extract(
             cloud,
             radius,
+            neighbors=neighbors,
             axes=axes,
             at=np.array(at) if at else None,
             voxel=voxel,
             viewpoint=viewpoint,
+            robust=robust,
             threads=threads,
             progress=progress,
         )
     clock.append(time.perf_counter())
+    typical = float(np.median(result.radius)) if len(result) else np.nan
     status = result.status.copy()
     columns: dict[str, ArrayLike] = {**result.columns(), "status": status}
     if like is not None:
-        columns["zeta"] = _similarity_to(like, cloud, result, viewpoint)
+        columns["zeta"] = _similarity_to(like, cloud, result, radius, neighbors, viewpoint)
     with progress_bar("writing", "points", shown=shown) as progress:
         write(
             output,
             cloud if not at and voxel is None else _part_of(cloud, result),
             columns,
             chunks=_signature_chunks(result, status) if signatures else None,
-            notes={"radius": repr(radius), "axes": axes},
+            notes=_notes(radius, neighbors, axes),
             progress=progress,
         )
     clock.append(time.perf_counter())
     seconds = dict(zip(("read", "extract", "write"), np.diff(clock).tolist(), strict=True))
-    summary = {"input": str(file), "output": str(output), "radius": radius, "axes": axes}
+    summary: dict[str, Any] = {
+        "input": str(file),
+        "output": str(output),
+        "radius": radius,
+        "neighbors": neighbors,
+    }
+    summary |= {"axes": axes}
     summary |= {"signatures": signatures, **_summary(result, status), "seconds": seconds}
     summary["points_per_second"] = len(result) / seconds["extract"] if seconds["extract"] else None
     if len(result) and not np.isfinite(result.k1).any():
         warnings.warn(
-            f"{output}: no point has a curvature; is the radius {number(radius)} right?", stacklevel=1
+            f"{output}: no point has a curvature; is the radius {number(typical)} right?", stacklevel=1
         )
     if as_json:
         print_json(summary)
     elif shown:
-        print_table(f"{output}, radius {number(radius)}, {axes} axes", _rows(summary), err=True)
+        print_table(f"{output}, radius {number(typical)}, {axes} axes", _rows(summary), err=True)
+
+
+def _notes(radius: float | None, neighbors: int | None, axes: Axes) -> dict[str, str]:
+    given = {"radius": radius, "neighbors": neighbors}
+    return {name: repr(value) for name, value in given.items() if value is not None} | {"axes": axes}
 
 
 def _part_of(cloud: PointCloud, result: Extraction) -> PointCloud:
@@ -144,6 +167,8 @@ def _similarity_to(
     place: tuple[float, float, float],
     cloud: PointCloud,
     result: Extraction,
+    radius: float | None,
+    neighbors: int | None,
     viewpoint: tuple[float, float, float] | None,
 ) -> NDArray[np.float32]:
     """Compare all places with one, with a flat atom as long as the whole scan's noise asks for."""
@@ -151,10 +176,12 @@ def _similarity_to(
 
     import surfsig
 
-    there = surfsig.extract(cloud, result.radius, axes=result.axes, at=[place], viewpoint=viewpoint)
+    there = surfsig.extract(
+        cloud, radius, neighbors=neighbors, axes=result.axes, at=[place], viewpoint=viewpoint
+    )
     typical = result if len(result) > 1 else there
     noise, count = np.nanmedian(typical.residual), np.median(typical.count)
-    flat = surfsig.flat_atom_length(float(noise), result.radius, float(count))
+    flat = surfsig.flat_atom_length(float(noise), float(np.median(typical.radius)), float(count))
     signature, status = there.signatures(flat_atom=flat, return_status=True)
     if np.isnan(signature).any():
         why = surfsig.Status(int(status[0])).name.lower().replace("_", " ")

@@ -35,7 +35,7 @@ def read(
     depth_scale: float | None = None,
     progress: ProgressCallback | None = None,
 ) -> PointCloud:
-    """Read a point cloud: PLY, PCD, text (XYZ, CSV, TXT, ASC), NPY, NPZ or Parquet.
+    """Read a point cloud: PLY, PCD, LAS, LAZ, COPC, text (XYZ, CSV, TXT, ASC), NPY, NPZ or Parquet.
 
     Parameters
     ----------
@@ -145,25 +145,28 @@ def write(
     notes: Mapping[str, str] | None = None,
     progress: ProgressCallback | None = None,
 ) -> None:
-    """Write a cloud with further columns: PLY (binary, little-endian), NPZ or Parquet, by the extension.
+    """Write a cloud with further columns: PLY, LAS, LAZ, NPZ or Parquet, by the extension.
 
     The file appears whole or not at all: a failure (a full disk) leaves an old file as it was.
 
     Parameters
     ----------
     path
-        The file; ``.ply``, ``.npz`` or ``.parquet``.
+        The file; ``.ply``, ``.las``, ``.laz``, ``.npz`` or ``.parquet``.
     cloud
-        Its points come first (in PLY as double where float would change one of them), then its fields. Or
+        Its points come first (in PLY as double where float would change one of them; in LAS and LAZ rounded
+        to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields. Or
         what else `PointCloud.of` takes.
     columns
         (n,) or (n, k) numbers by name. ``normals`` (n, 3) are written as nx, ny, nz and ``colors`` (n, 3 or
-        4) as red, green, blue (and alpha). In PLY any other (n, k) column becomes NAME_0, NAME_1, ...; in NPZ
-        and Parquet it stays one. A field of the cloud with the same name is kept as ``input_NAME``.
+        4) as red, green, blue (and alpha). Any other (n, k) column stays one in NPZ and Parquet, and becomes
+        NAME_0, NAME_1, ... in PLY, LAS and LAZ. A field of the cloud with the same name is kept as
+        ``input_NAME``.
     chunks
         One more column, (n, width), given block by block so that it need not fit in memory.
     notes
-        Words about the whole file (PLY comments, Parquet metadata, the array ``notes`` of NPZ, as JSON).
+        Words about the whole file (PLY comments, Parquet metadata, a record of LAS, the array ``notes`` of
+        NPZ, as JSON).
     progress
         Called with the points written so far and their number.
 
@@ -172,7 +175,13 @@ def write(
     OSError
         If the file cannot be written.
     InvalidInputError
-        If a column has the wrong length or type, or the extension is none that can be written.
+        If a column has the wrong length or type, the extension is none that can be written, or LAS cannot
+        hold so wide a cloud or so many columns.
+
+    Warns
+    -----
+    UserWarning
+        If points that are not finite are left out (LAS and LAZ).
     """
     path = Path(path)
     cloud = PointCloud.of(cloud)

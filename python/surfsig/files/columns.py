@@ -109,7 +109,7 @@ def cloud_from_columns(
     return PointCloud(
         offsets,
         viewpoint=None if viewpoint is None else np.asarray(viewpoint, dtype=np.float64),
-        fields=_with_colours(others),
+        fields=with_colours(others),
         grid=grid,
     )
 
@@ -246,6 +246,20 @@ def columns_of(rows: NDArray[Any]) -> dict[str, NDArray[Any]]:
     return columns
 
 
+def with_colours(fields: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Call colours red, green, blue and alpha, as uint8, where the values are whole numbers up to 255."""
+    named = {name: _COLOURS[name.lower()] for name in fields if name.lower() in _COLOURS}
+    colours = sorted(set(named.values()) - {"alpha"})
+    if len(set(named.values())) < len(named) or colours != ["blue", "green", "red"]:
+        return fields
+    if not all(_is_byte(fields[name]) for name in named):
+        return fields
+    return {
+        named.get(name, name): values.astype(np.uint8, copy=False) if name in named else values
+        for name, values in fields.items()
+    }
+
+
 def numeric_columns(rows: NDArray[Any], source: str) -> dict[str, NDArray[Any]]:
     """Give a structured array's (n,) fields of numbers, as (n, k) where they have further axes.
 
@@ -297,20 +311,6 @@ def _split(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
     if array.ndim == 2 and name == "colors" and array.shape[1] in (3, 4):
         return dict(zip(("red", "green", "blue", "alpha"), array.T, strict=False))
     return {name: array}
-
-
-def _with_colours(fields: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Call colours red, green, blue and alpha, as uint8, where the values are whole numbers up to 255."""
-    named = {name: _COLOURS[name.lower()] for name in fields if name.lower() in _COLOURS}
-    colours = sorted(set(named.values()) - {"alpha"})
-    if len(set(named.values())) < len(named) or colours != ["blue", "green", "red"]:
-        return fields
-    if not all(_is_byte(fields[name]) for name in named):
-        return fields
-    return {
-        named.get(name, name): values.astype(np.uint8, copy=False) if name in named else values
-        for name, values in fields.items()
-    }
 
 
 def _is_byte(values: NDArray[Any]) -> bool:

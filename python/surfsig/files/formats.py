@@ -11,7 +11,7 @@ from typing import Any, BinaryIO, Protocol
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError, InvalidInputError
-from surfsig.files import numpy_files, parquet, pcd, ply, text
+from surfsig.files import las, las_write, numpy_files, parquet, pcd, ply, text
 from surfsig.files.columns import Chunks
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
@@ -107,7 +107,8 @@ FORMATS = (
     Format(
         "Parquet", (".parquet",), _begins(parquet.MAGIC), parquet.read, parquet.write, parquet.check_available
     ),
-    Format("LAS or LAZ", (".las", ".laz"), _begins(b"LASF")),
+    Format("LAZ", (".laz",), _matches(las.LAZ_MAGIC), las.read, las_write.write_laz, takes=("box",)),
+    Format("LAS", (".las",), _begins(las.MAGIC), las.read, las_write.write_las, takes=("box",)),
     Format("E57", (".e57",), _begins(b"ASTM-E57")),
     Format("PNG image", (".png",), _begins(b"\x89PNG")),
     Format("JPEG image", (".jpg", ".jpeg"), _begins(b"\xff\xd8\xff")),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,14 +35,20 @@ def box_array(box: ArrayLike) -> NDArray[np.float64]:
     return corners
 
 
-def cropped(cloud: PointCloud, box: NDArray[np.float64]) -> PointCloud:
-    """Keep the points in a box (both corners belong to it); points that are not finite are in none."""
+def inside(offsets: NDArray[Any], origin: NDArray[np.float64], box: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which points are in a box (both corners belong to it); points that are not finite are in none."""
+    chosen = np.ones(len(offsets), np.bool_)
     with np.errstate(invalid="ignore"):
-        inside = np.ones(len(cloud), np.bool_)
         for axis in range(3):
-            values = cloud.origin[axis] + cloud.offsets[:, axis]
-            inside &= (values >= box[0, axis]) & (values <= box[1, axis])
-    return cloud if inside.all() else cloud.at(np.flatnonzero(inside))
+            values = origin[axis] + offsets[:, axis]
+            chosen &= (values >= box[0, axis]) & (values <= box[1, axis])
+    return chosen
+
+
+def cropped(cloud: PointCloud, box: NDArray[np.float64]) -> PointCloud:
+    """Keep the points in a box, as `inside` tells them."""
+    chosen = inside(cloud.offsets, cloud.origin, box)
+    return cloud if chosen.all() else cloud.at(np.flatnonzero(chosen))
 
 
 def in_metres(cloud: PointCloud, metres: float) -> PointCloud:

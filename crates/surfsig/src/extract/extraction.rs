@@ -27,8 +27,11 @@ use rayon::prelude::*;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Extraction {
-    /// Radius of the balls.
+    /// Radius of the balls; of nearest neighbours, of the largest ball that was looked through.
     pub radius: f64,
+    /// Radius of each query's neighbourhood, where each has its own: the distance to its farthest
+    /// point. Empty where all have the same.
+    pub radii: Vec<f32>,
     /// Axes in which the paraboloids were fitted.
     pub axes: FitAxes,
     /// Whether a known sensor oriented the normals; otherwise the side of each normal, and with it
@@ -47,6 +50,12 @@ pub struct Extraction {
     /// How much, at least, the worst determined coefficient suffers from the points' arrangement: the
     /// factor on its standard error (1: not at all; about 1.5 on a full disc).
     pub condition: Vec<f32>,
+    /// Standard error of (k1 + k2) / 2. NaN in the sensor's axes.
+    pub mean_curvature_std: Vec<f32>,
+    /// Standard error of k1: right where k1 and k2 differ significantly.
+    pub k1_std: Vec<f32>,
+    /// Standard error of k2.
+    pub k2_std: Vec<f32>,
     /// Points in the ball, the query itself included where it is one of the cloud's.
     pub count: Vec<u32>,
     /// What became of each query.
@@ -74,6 +83,40 @@ impl Extraction {
         self.k1.is_empty()
     }
 
+    /// Radius of a query's neighbourhood.
+    ///
+    /// # Panics
+    /// If `index` is outside.
+    pub fn radius_of(&self, index: usize) -> f64 {
+        if self.radii.is_empty() { self.radius } else { f64::from(self.radii[index]) }
+    }
+
+    /// Takes over the values of some queries, by their numbers, from another extraction.
+    pub(super) fn replace(&mut self, queries: &[usize], with: &Self) {
+        fn take<T: Copy>(column: &mut [T], queries: &[usize], with: &[T]) {
+            for (&query, &value) in queries.iter().zip(with) {
+                column[query] = value;
+            }
+        }
+        self.radius = with.radius;
+        take(&mut self.radii, queries, &with.radii);
+        take(&mut self.k1, queries, &with.k1);
+        take(&mut self.k2, queries, &with.k2);
+        take(&mut self.normals, queries, &with.normals);
+        take(&mut self.directions, queries, &with.directions);
+        take(&mut self.residual, queries, &with.residual);
+        take(&mut self.condition, queries, &with.condition);
+        take(&mut self.mean_curvature_std, queries, &with.mean_curvature_std);
+        take(&mut self.k1_std, queries, &with.k1_std);
+        take(&mut self.k2_std, queries, &with.k2_std);
+        take(&mut self.count, queries, &with.count);
+        take(&mut self.status, queries, &with.status);
+        take(&mut self.linearity, queries, &with.linearity);
+        take(&mut self.planarity, queries, &with.planarity);
+        take(&mut self.scattering, queries, &with.scattering);
+        take(&mut self.coefficients, queries, &with.coefficients);
+    }
+
     /// The fitted paraboloid of a query in patch units (lengths divided by the patch's side, twice
     /// the radius), from which a signature is made. In the surface's axes x runs along k1.
     ///
@@ -87,7 +130,7 @@ impl Extraction {
     /// # Ok::<(), surfsig::Error>(())
     /// ```
     pub fn paraboloid(&self, index: usize) -> Paraboloid {
-        let side = 2.0 * self.radius;
+        let side = 2.0 * self.radius_of(index);
         match self.axes {
             FitAxes::Surface => Paraboloid::of_principal_curvatures(self.k1[index], self.k2[index], side),
             FitAxes::Sensor => Paraboloid::of_coefficients(self.coefficients[index], side),
@@ -99,12 +142,16 @@ impl Extraction {
 /// memory of its own, one entry after the other.
 pub(super) struct Columns {
     radius: f64,
+    radii: Vec<f32>,
     k1: Vec<f32>,
     k2: Vec<f32>,
     normals: Vec<[f32; 3]>,
     directions: Vec<[f32; 3]>,
     residual: Vec<f32>,
     condition: Vec<f32>,
+    mean_curvature_std: Vec<f32>,
+    k1_std: Vec<f32>,
+    k2_std: Vec<f32>,
     count: Vec<u32>,
     status: Vec<Status>,
     linearity: Vec<f32>,
@@ -116,12 +163,17 @@ pub(super) struct Columns {
 /// Some neighbouring entries of the columns.
 pub(super) struct ColumnsPart<'a> {
     radius: f64,
+    /// Empty where all queries have one radius.
+    radii: &'a mut [f32],
     k1: &'a mut [f32],
     k2: &'a mut [f32],
     normals: &'a mut [[f32; 3]],
     directions: &'a mut [[f32; 3]],
     residual: &'a mut [f32],
     condition: &'a mut [f32],
+    mean_curvature_std: &'a mut [f32],
+    k1_std: &'a mut [f32],
+    k2_std: &'a mut [f32],
     count: &'a mut [u32],
     status: &'a mut [Status],
     linearity: &'a mut [f32],
@@ -132,18 +184,22 @@ pub(super) struct ColumnsPart<'a> {
 }
 
 impl Columns {
-    pub fn new(len: usize, radius: f64, axes: FitAxes) -> Self {
+    pub fn new(len: usize, radius: f64, own_radii: bool, axes: FitAxes) -> Self {
         // Zeros cost nothing until they are written over, and then in many threads at once.
         let zeros = || vec![0.0; len];
         let fitted = if axes == FitAxes::Sensor { len } else { 0 };
         Self {
             radius,
+            radii: if own_radii { zeros() } else { Vec::new() },
             k1: zeros(),
             k2: zeros(),
             normals: vec![[0.0; 3]; len],
             directions: vec![[0.0; 3]; len],
             residual: zeros(),
             condition: zeros(),
+            mean_curvature_std: zeros(),
+            k1_std: zeros(),
+            k2_std: zeros(),
             count: vec![0; len],
             status: vec![Status::NotFinite; len],
             linearity: zeros(),
@@ -156,11 +212,15 @@ impl Columns {
     /// The columns cut into parts of `len` entries, the last of which may be shorter.
     pub fn parts(&mut self, len: usize) -> Vec<ColumnsPart<'_>> {
         let mut coefficients = self.coefficients.chunks_mut(len);
+        let mut radii = self.radii.chunks_mut(len);
         let mut scalars = [
             &mut self.k1,
             &mut self.k2,
             &mut self.residual,
             &mut self.condition,
+            &mut self.mean_curvature_std,
+            &mut self.k1_std,
+            &mut self.k2_std,
             &mut self.linearity,
             &mut self.planarity,
             &mut self.scattering,
@@ -171,16 +231,30 @@ impl Columns {
         vectors
             .zip(numbers)
             .map(|((normals, directions), (count, status))| {
-                let [k1, k2, residual, condition, linearity, planarity, scattering] =
-                    scalars.each_mut().map(|column| column.next().expect("columns of one length"));
+                let [
+                    k1,
+                    k2,
+                    residual,
+                    condition,
+                    mean_curvature_std,
+                    k1_std,
+                    k2_std,
+                    linearity,
+                    planarity,
+                    scattering,
+                ] = scalars.each_mut().map(|column| column.next().expect("columns of one length"));
                 ColumnsPart {
                     radius: self.radius,
+                    radii: radii.next().unwrap_or_default(),
                     k1,
                     k2,
                     normals,
                     directions,
                     residual,
                     condition,
+                    mean_curvature_std,
+                    k1_std,
+                    k2_std,
                     count,
                     status,
                     linearity,
@@ -207,12 +281,14 @@ impl Columns {
         }
         let scalar = |column| ordered(column, &entries, f32::NAN);
         let vector = |column| ordered(column, &entries, [f32::NAN; 3]);
+        let radii = if self.radii.is_empty() { Vec::new() } else { scalar(self.radii) };
         let coefficients = match axes {
             FitAxes::Surface => Vec::new(),
             FitAxes::Sensor => ordered(self.coefficients, &entries, [f32::NAN; 6]),
         };
         Extraction {
             radius: self.radius,
+            radii,
             axes,
             oriented,
             k1: scalar(self.k1),
@@ -221,6 +297,9 @@ impl Columns {
             directions: vector(self.directions),
             residual: scalar(self.residual),
             condition: scalar(self.condition),
+            mean_curvature_std: scalar(self.mean_curvature_std),
+            k1_std: scalar(self.k1_std),
+            k2_std: scalar(self.k2_std),
             count: ordered(self.count, &entries, 0),
             status: ordered(self.status, &entries, Status::NotFinite),
             linearity: scalar(self.linearity),
@@ -237,15 +316,21 @@ impl ColumnsPart<'_> {
         self.k1.len()
     }
 
-    /// Writes one lane of a batch, which came in units of the radius.
-    pub fn write(&mut self, entry: usize, count: f64, fits: &Paraboloids, lane: usize) {
-        let r = self.radius;
+    /// Writes one lane of a batch, which came in units of its neighbourhood's radius; that one is in
+    /// units of the lattice's.
+    pub fn write(&mut self, entry: usize, count: f64, radius: f64, fits: &Paraboloids, lane: usize) {
+        let r = self.radius * radius;
+        if let Some(own) = self.radii.get_mut(entry) {
+            *own = r as f32;
+        }
         let status = if fits.too_few.get(lane) {
             Status::TooFewPoints
         } else if fits.no_plane.get(lane) || fits.singular.get(lane) {
             Status::Degenerate
         } else if !fits.converged.get(lane) {
             Status::NotConverged
+        } else if fits.one_sided.get(lane) {
+            Status::OneSided
         } else {
             Status::Ok
         };
@@ -263,6 +348,10 @@ impl ColumnsPart<'_> {
         self.k2[entry] = curvature(fits.principal.k2.0[lane] / r);
         self.residual[entry] = curvature(fits.residual.0[lane] * r);
         self.condition[entry] = curvature(fits.condition.0[lane]);
+        let [c1, _, between, _, _, c2] = fits.covariance.map(|c| c.0[lane]);
+        self.k1_std[entry] = curvature(c1.sqrt() / r);
+        self.k2_std[entry] = curvature(c2.sqrt() / r);
+        self.mean_curvature_std[entry] = curvature(0.5 * (c1 + between + between + c2).sqrt() / r);
         self.directions[entry] = fits.principal.direction.map(|v| curvature(v.0[lane]));
         if let Some(coefficients) = self.coefficients.get_mut(entry) {
             // Heights grow away from the sensor, and the normal points to it.

@@ -2,11 +2,14 @@
 
 mod extraction;
 mod monitor;
+mod neighborhood;
 mod queries;
+mod robust;
 mod status;
 
 pub use extraction::Extraction;
 pub use monitor::Monitor;
+pub use neighborhood::Neighborhood;
 pub use queries::{Queries, voxel_representatives};
 pub use status::Status;
 
@@ -15,13 +18,16 @@ use crate::cell_index::{CellIndex, Row, RowKey};
 use crate::fit::FitAxes;
 use crate::fit::paraboloid::{Paraboloids, Task, fit_paraboloids};
 use crate::fit::tensor::MomentBatch;
-use crate::moments::Moments;
+use crate::members::Members;
+use crate::moments::{Moments, Scalar};
 use crate::simd::InstructionSet;
 use crate::simd::lanes::{LANES, Lanes};
 use crate::threads::with_threads;
 use crate::{Error, PointCloud, Radius};
 use extraction::{Columns, ColumnsPart};
+use neighborhood::first_radius;
 use rayon::prelude::*;
+use robust::without_outliers;
 use std::ops::Range;
 
 /// Queries that one thread takes at a time.
@@ -38,18 +44,25 @@ const RUN: usize = 32;
 /// assert_eq!(options.axes, FitAxes::Surface);
 /// ```
 #[derive(Debug, Clone, Default)]
-pub struct ExtractOptions {
+pub struct ExtractOptions<'a> {
     /// Axes in which the paraboloids are fitted.
     pub axes: FitAxes,
     /// Where the sensor stood, in the cloud's coordinates.
     pub viewpoint: Option<[f64; 3]>,
+    /// In place of a viewpoint: for each query a vector to the side from which it was seen, such as a
+    /// normal that somebody knows. It chooses the side of the fitted normal and nothing else; where it is
+    /// zero or not finite, nobody knows.
+    pub directions: Option<&'a [[f32; 3]]>,
+    /// Leave out points that are far from the fitted surface, by three standard deviations of the others, and
+    /// fit again, until none is left out or comes back. The count is then that of the points that stay.
+    pub robust: bool,
     /// Number of threads; all cores where it is `None`. The result is the same, bit for bit.
     pub threads: Option<usize>,
     /// Instructions to use; the best there are where it is `None`. The result is the same, bit for bit.
     pub instruction_set: Option<InstructionSet>,
 }
 
-/// Curvature at every point of a cloud, from the points within a radius.
+/// Curvature at every point of a cloud, from the points within a radius or another [`Neighborhood`].
 ///
 /// # Errors
 /// [`Error::RadiusBelowResolution`] where the radius is too small for the cloud's coordinates;
@@ -65,10 +78,10 @@ pub struct ExtractOptions {
 /// ```
 pub fn extract(
     cloud: &PointCloud<'_>,
-    radius: Radius,
-    options: &ExtractOptions,
+    neighborhood: impl Into<Neighborhood>,
+    options: &ExtractOptions<'_>,
 ) -> Result<Extraction, Error> {
-    extract_monitored(cloud, radius, &Queries::All, options, &Monitor::default())
+    extract_monitored(cloud, neighborhood, &Queries::All, options, &Monitor::default())
 }
 
 /// Curvature at chosen places, for a caller who watches.
@@ -92,48 +105,99 @@ pub fn extract(
 /// ```
 pub fn extract_monitored(
     cloud: &PointCloud<'_>,
-    radius: Radius,
+    neighborhood: impl Into<Neighborhood>,
     queries: &Queries<'_>,
-    options: &ExtractOptions,
+    options: &ExtractOptions<'_>,
     monitor: &Monitor,
 ) -> Result<Extraction, Error> {
-    with_threads(options.threads, || run(cloud, radius, queries, options, monitor))?
+    let neighborhood = neighborhood.into();
+    neighborhood.check()?;
+    queries.check(cloud)?;
+    if let Some(directions) = options.directions.map(<[_]>::len).filter(|&n| n != queries.len(cloud)) {
+        return Err(Error::DirectionsMismatch { directions, queries: queries.len(cloud) });
+    }
+    with_threads(options.threads, || match neighborhood {
+        Neighborhood::Ball(radius) | Neighborhood::Hybrid { radius, .. } => {
+            Ok(run(cloud, radius, neighborhood, queries, options, monitor)?.0)
+        }
+        Neighborhood::Nearest(k) => run_nearest(cloud, k, queries, options, monitor),
+    })?
+}
+
+/// Balls that grow until each holds its k nearest points.
+fn run_nearest(
+    cloud: &PointCloud<'_>,
+    k: usize,
+    queries: &Queries<'_>,
+    options: &ExtractOptions<'_>,
+    monitor: &Monitor,
+) -> Result<Extraction, Error> {
+    let mut radius = first_radius(cloud, k, monitor)?;
+    let (mut found, index) = run(cloud, radius, Neighborhood::Nearest(k), queries, options, monitor)?;
+    let mut left = unresolved(&found, k, &index);
+    while !left.is_empty() {
+        // The count of what is done starts again for those that need more.
+        monitor.take_back(left.len());
+        radius = Radius::new(2.0 * radius.get())?;
+        let some = queries.some(&left);
+        let directions: Option<Vec<[f32; 3]>> =
+            options.directions.map(|all| left.iter().map(|&i| all[i]).collect());
+        let options = ExtractOptions { directions: directions.as_deref(), ..options.clone() };
+        let (more, index) = run(cloud, radius, Neighborhood::Nearest(k), &some.queries(), &options, monitor)?;
+        found.replace(&left, &more);
+        let still = unresolved(&more, k, &index);
+        left = still.into_iter().map(|i| left[i]).collect();
+    }
+    Ok(found)
+}
+
+/// The queries that have fewer than k points where there are more.
+fn unresolved(found: &Extraction, k: usize, index: &CellIndex) -> Vec<usize> {
+    let enough = k.min(index.len());
+    let short = |&i: &usize| (found.count[i] as usize) < enough && found.status[i] != Status::NotFinite;
+    (0..found.len()).filter(short).collect()
 }
 
 fn run(
     cloud: &PointCloud<'_>,
     radius: Radius,
+    neighborhood: Neighborhood,
     queries: &Queries<'_>,
-    options: &ExtractOptions,
+    options: &ExtractOptions<'_>,
     monitor: &Monitor,
-) -> Result<Extraction, Error> {
-    queries.check(cloud)?;
+) -> Result<(Extraction, CellIndex), Error> {
     let index = CellIndex::of_positions(cloud.len(), |i| cloud.position(i), radius, monitor)?;
     let elsewhere = queries.index(cloud, radius, monitor)?;
     let asked = elsewhere.as_ref().unwrap_or(&index);
-    let mut columns = Columns::new(asked.len(), radius.get(), options.axes);
+    let own_radii = !matches!(neighborhood, Neighborhood::Ball(_));
+    let mut columns = Columns::new(asked.len(), radius.get(), own_radii, options.axes);
     let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
     let parts = columns.parts(CHUNK);
     parts.into_par_iter().enumerate().try_for_each_init(
-        || Worker::new(&index, asked, options, set),
+        || Worker::new(&index, asked, neighborhood, options, set),
         |worker, (chunk, mut part)| {
             worker.extract(chunk * CHUNK, &mut part, monitor)?;
             monitor.add(part.len());
             Ok(())
         },
     )?;
-    let oriented = options.viewpoint.is_some();
-    Ok(columns.finish(queries.len(cloud), &asked.point_of_rank, options.axes, oriented))
+    let oriented = options.viewpoint.is_some() || options.directions.is_some();
+    let found = columns.finish(queries.len(cloud), &asked.point_of_rank, options.axes, oriented);
+    Ok((found, index))
 }
 
 /// One thread's share of the loop: gathers moments until a batch is full, fits it, writes it.
 struct Worker<'a> {
     walk: DirectWalk<'a>,
     asked: &'a CellIndex,
-    options: &'a ExtractOptions,
+    neighborhood: Neighborhood,
+    options: &'a ExtractOptions<'a>,
     set: InstructionSet,
     pending: Vec<Pending>,
     moments: Vec<Moments<f64>>,
+    /// Of each pending query, where its points are looked at more than once.
+    members: Vec<Members>,
+    distances: Vec<f64>,
 }
 
 /// A query whose moments wait for their batch.
@@ -143,18 +207,24 @@ struct Pending {
     offset: [f32; 3],
     /// Where its values belong in the thread's part of the columns.
     entry: usize,
+    /// Its number among the queries.
+    query: u32,
+    /// Radius of its neighbourhood, in units of the lattice's.
+    radius: f64,
 }
 
 impl<'a> Worker<'a> {
     fn new(
         index: &'a CellIndex,
         asked: &'a CellIndex,
-        options: &'a ExtractOptions,
+        neighborhood: Neighborhood,
+        options: &'a ExtractOptions<'a>,
         set: InstructionSet,
     ) -> Self {
         let walk = DirectWalk::new(index, set);
         let (pending, moments) = (Vec::with_capacity(LANES), Vec::with_capacity(LANES));
-        Self { walk, asked, options, set, pending, moments }
+        let members = (0..LANES).map(|_| Members::new()).collect();
+        Self { walk, asked, neighborhood, options, set, pending, moments, members, distances: Vec::new() }
     }
 
     /// Fills a part of the columns, whose first entry is the query of rank `first`.
@@ -201,8 +271,10 @@ impl<'a> Worker<'a> {
         self.walk.enter_run(low, high);
         for rank in run.clone() {
             let offset = [x[rank], y[rank], z[rank]];
-            self.pending.push(Pending { key, offset, entry: rank - first });
-            self.moments.push(self.walk.moments::<f32>(offset));
+            let (moments, radius) = self.around::<f32>(offset, self.pending.len());
+            let query = self.asked.point_of_rank[rank];
+            self.pending.push(Pending { key, offset, entry: rank - first, query, radius });
+            self.moments.push(moments);
             if self.pending.len() == LANES && self.fit_pending(part) {
                 // The walk went back to points of the batch.
                 self.walk.enter_row(key);
@@ -210,6 +282,21 @@ impl<'a> Worker<'a> {
             }
         }
         run.end
+    }
+
+    /// The moments around a query in units of its neighbourhood's radius, and that radius in units of the
+    /// lattice's.
+    fn around<S: Scalar>(&mut self, offset: [f32; 3], lane: usize) -> (Moments<f64>, f64) {
+        let (most, radius_of_fewer) = match self.neighborhood {
+            Neighborhood::Ball(_) if !self.options.robust => return (self.walk.moments::<S>(offset), 1.0),
+            Neighborhood::Ball(_) => (usize::MAX, Some(1.0)),
+            Neighborhood::Nearest(k) => (k, None),
+            Neighborhood::Hybrid { most, .. } => (most, Some(1.0)),
+        };
+        let members = &mut self.members[lane];
+        members.take(&mut self.walk, offset);
+        let radius = members.keep_nearest(most, radius_of_fewer);
+        (members.moments::<S>(self.set, |_| true), radius)
     }
 
     /// Fits and writes the pending queries; says whether the walk has moved for it.
@@ -223,29 +310,57 @@ impl<'a> Worker<'a> {
             let Pending { key, offset, .. } = self.pending[lane];
             self.walk.enter_row(key);
             self.walk.enter_run(offset, offset);
-            self.moments[lane] = self.walk.moments::<f64>(offset);
+            self.moments[lane] = self.around::<f64>(offset, lane).0;
         }
         if !again.is_empty() {
             fits = self.fit();
         }
+        if self.options.robust {
+            fits = self.fit_without_outliers(fits);
+        }
         for (lane, (query, moments)) in self.pending.iter().zip(&self.moments).enumerate() {
-            part.write(query.entry, moments.sums[0], &fits, lane);
+            part.write(query.entry, moments.sums[0], query.radius, &fits, lane);
         }
         self.pending.clear();
         self.moments.clear();
         !again.is_empty()
     }
 
+    /// Fits again, without the points that are far from the fits, until the choice of points stands.
+    fn fit_without_outliers(&mut self, mut fits: Paraboloids) -> Paraboloids {
+        for _ in 0..robust::MAX_PASSES {
+            let mut changed = false;
+            for lane in 0..self.pending.len() {
+                let fitted = self.moments[lane].count();
+                let (members, distances) = (&mut self.members[lane], &mut self.distances);
+                if let Some(moments) = without_outliers(members, &fits, lane, fitted, self.set, distances) {
+                    self.moments[lane] = moments;
+                    changed = true;
+                }
+            }
+            if !changed {
+                break;
+            }
+            fits = self.fit();
+        }
+        fits
+    }
+
     fn fit(&self) -> Paraboloids {
         let batch = MomentBatch::new(&self.moments);
-        let to_sensor = self.options.viewpoint.map(|viewpoint| {
-            [0, 1, 2].map(|axis| {
-                Lanes(std::array::from_fn(|lane| {
-                    let Pending { key, offset, .. } = self.pending[lane.min(self.pending.len() - 1)];
-                    viewpoint[axis] - self.asked.lattice.middle(key)[axis] - f64::from(offset[axis])
-                }))
-            })
-        });
+        let pending = |lane: usize| self.pending[lane.min(self.pending.len() - 1)];
+        let each = |towards: &dyn Fn(Pending, usize) -> f64| {
+            [0, 1, 2].map(|axis| Lanes(std::array::from_fn(|lane| towards(pending(lane), axis))))
+        };
+        let to_sensor = match (self.options.viewpoint, self.options.directions) {
+            (Some(viewpoint), _) => Some(each(&|Pending { key, offset, .. }, axis| {
+                viewpoint[axis] - self.asked.lattice.middle(key)[axis] - f64::from(offset[axis])
+            })),
+            (None, Some(directions)) => {
+                Some(each(&|Pending { query, .. }, axis| f64::from(directions[query as usize][axis])))
+            }
+            (None, None) => None,
+        };
         fit_paraboloids(self.set, &Task { moments: &batch, axes: self.options.axes, to_sensor })
     }
 }

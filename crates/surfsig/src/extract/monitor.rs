@@ -36,6 +36,11 @@ impl Monitor {
         if self.cancelled.load(Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
     }
 
+    /// Some queries must be done again.
+    pub(crate) fn take_back(&self, queries: usize) {
+        self.done.fetch_sub(queries, Relaxed);
+    }
+
     pub(crate) fn add(&self, queries: usize) {
         self.done.fetch_add(queries, Relaxed);
     }

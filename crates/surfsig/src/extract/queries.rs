@@ -41,6 +41,18 @@ impl Queries<'_> {
         }
     }
 
+    /// Those with the given numbers.
+    pub(super) fn some(&self, chosen: &[usize]) -> SomeQueries {
+        match self {
+            Self::All => SomeQueries::Indices(chosen.iter().map(|&i| i as u32).collect()),
+            Self::Indices(indices) => SomeQueries::Indices(chosen.iter().map(|&i| indices[i]).collect()),
+            Self::Positions(positions) => {
+                let place = |&i: &usize| positions.position(i).unwrap_or([f64::NAN; 3]);
+                SomeQueries::Positions(chosen.iter().map(place).collect())
+            }
+        }
+    }
+
     /// The queries sorted into rows, or `None` where they are the cloud's points themselves.
     pub(super) fn index(
         &self,
@@ -58,6 +70,21 @@ impl Queries<'_> {
                 let position = |i| positions.position(i);
                 CellIndex::of_positions(positions.len(), position, radius, monitor).map(Some)
             }
+        }
+    }
+}
+
+/// Some of the queries, as a list of their own.
+pub(super) enum SomeQueries {
+    Indices(Vec<u32>),
+    Positions(Vec<[f64; 3]>),
+}
+
+impl SomeQueries {
+    pub fn queries(&self) -> Queries<'_> {
+        match self {
+            Self::Indices(indices) => Queries::Indices(indices),
+            Self::Positions(positions) => Queries::Positions(PointCloud::new_f64(positions)),
         }
     }
 }

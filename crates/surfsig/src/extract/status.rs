@@ -23,17 +23,21 @@ pub enum Status {
     NotConverged = 4,
     /// The surface is more curved than any atom of the frame: curvature, but no signature.
     OutsideVocabulary = 5,
+    /// The points lie mostly on one side, as at the rim of a scan: all values are there, with the standard
+    /// errors of such a patch, and a bias where the surface is not a paraboloid.
+    OneSided = 6,
 }
 
 impl Status {
     /// All of them, in the order of their numbers.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Ok,
         Self::NotFinite,
         Self::TooFewPoints,
         Self::Degenerate,
         Self::NotConverged,
         Self::OutsideVocabulary,
+        Self::OneSided,
     ];
 
     /// The name, in lower case with underscores.
@@ -49,6 +53,7 @@ impl Status {
             Self::Degenerate => "degenerate",
             Self::NotConverged => "not_converged",
             Self::OutsideVocabulary => "outside_vocabulary",
+            Self::OneSided => "one_sided",
         }
     }
 }

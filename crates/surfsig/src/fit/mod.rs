@@ -2,6 +2,7 @@
 
 mod covariance;
 pub(crate) mod paraboloid;
+mod shape_error;
 pub(crate) mod tensor;
 
 pub use paraboloid::FitAxes;

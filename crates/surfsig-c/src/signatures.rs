@@ -1,0 +1,99 @@
+//! Signatures of places, and how alike they are.
+
+use crate::arrays::{array, room};
+use crate::code::{Failure, guarded, surfsig_code};
+use crate::extraction::surfsig_extraction;
+use crate::status::surfsig_status;
+use surfsig::{Extraction, FitAxes, Frame, SIGNATURE, Status, similarity, with_threads};
+
+/// Numbers of a signature.
+pub const SURFSIG_SIGNATURE: usize = 242;
+const _: () = assert!(SURFSIG_SIGNATURE == SIGNATURE);
+
+/// Makes the signatures of chosen places, in the default frame. The first call of a process also makes the
+/// frame, in some tens of milliseconds.
+///
+/// @param extraction Where the places' surfaces are.
+/// @param places Numbers of places, from 0, (count); null for the first count of them.
+/// @param count How many; 0 does nothing.
+/// @param signatures Where they are put: (count, 242) floats, row by row; NaN where there is none.
+/// @param statuses Where it is put why, (count); null if nobody asks.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn surfsig_signatures(
+    extraction: Option<&surfsig_extraction>,
+    places: *const u32,
+    count: usize,
+    signatures: *mut f32,
+    statuses: *mut surfsig_status,
+) -> surfsig_code {
+    guarded(|| {
+        let Some(surfsig_extraction { found, threads }) = extraction else {
+            return Err(Failure::invalid_input("extraction must not be null"));
+        };
+        let places: Vec<usize> = if places.is_null() {
+            within(count.checked_sub(1), found)?;
+            (0..count).collect()
+        } else {
+            // SAFETY: the caller gives `count` numbers.
+            let places = unsafe { array(places, count, "places") }?;
+            within(places.iter().max().map(|&place| place as usize), found)?;
+            places.iter().map(|&place| place as usize).collect()
+        };
+        // SAFETY: the caller gives room for `count` rows.
+        let rows = unsafe { room(signatures.cast::<[f32; SIGNATURE]>(), count, "signatures") }?;
+        let mut made: Vec<Status> = places.iter().map(|&place| found.status[place]).collect();
+        with_threads(*threads, || fill(found, &places, rows, &mut made))?;
+        if !statuses.is_null() {
+            // SAFETY: the caller gives room for `count` bytes, and `made` has as many; their numbers are
+            // the same in C, which status.rs asserts.
+            unsafe { made.as_ptr().cast::<surfsig_status>().copy_to(statuses, count) };
+        }
+        Ok(())
+    })
+}
+
+/// An error where the last place is not the extraction's.
+fn within(last: Option<usize>, found: &Extraction) -> Result<(), Failure> {
+    match last {
+        Some(last) if last >= found.len() => {
+            let message = format!("place {last} is outside an extraction of {} places", found.len());
+            Err(Failure::invalid_input(message))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Fills the rows, and marks in `statuses`, which hold the fits' own, what the frame does not reach.
+fn fill(found: &Extraction, places: &[usize], rows: &mut [[f32; SIGNATURE]], statuses: &mut [Status]) {
+    let (frame, side) = (Frame::shared(), 2.0 * found.radius);
+    match found.axes {
+        FitAxes::Surface => {
+            let curvatures: Vec<_> = places.iter().map(|&i| [found.k1[i], found.k2[i]]).collect();
+            frame.signatures_of_curvatures(side, &curvatures, rows, statuses);
+        }
+        FitAxes::Sensor => {
+            let surfaces: Vec<_> = places.iter().map(|&i| found.coefficients[i]).collect();
+            frame.signatures_of_surfaces(side, &surfaces, rows, statuses);
+        }
+    }
+}
+
+/// zeta of eq. (12): how alike the surfaces of two signatures are, from 0 to 1; 0.9 and above is optimal, 0.5
+/// and above good. NaN where a signature is missing, zero, or null.
+///
+/// Both must have been made at the same radius, in the same axes. Where an extraction knew no viewpoint, it
+/// may have seen the surface from its other side, from where the signature is another one.
+///
+/// @param a 242 floats.
+/// @param b 242 floats.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn surfsig_similarity(a: *const f32, b: *const f32) -> f64 {
+    let mut zeta = f64::NAN;
+    guarded(|| {
+        // SAFETY: the caller gives signatures.
+        let (a, b) = unsafe { (array(a, SIGNATURE, "a")?, array(b, SIGNATURE, "b")?) };
+        zeta = similarity(a, b);
+        Ok(())
+    });
+    zeta
+}

@@ -1,0 +1,76 @@
+//! Which points around a query count.
+
+use crate::{Error, Monitor, PointCloud, Radius};
+use rayon::prelude::*;
+
+/// Queries at which the distance to the k-th neighbour is looked up, to choose a first radius.
+const SAMPLES: usize = 24;
+
+/// The points around a query that a surface is fitted to.
+///
+/// ```
+/// use surfsig::{extract, ExtractOptions, Neighborhood, PointCloud, Radius};
+/// let points: Vec<[f32; 3]> = (0..400).map(|i| [(i % 20) as f32, (i / 20) as f32, 0.0]).collect();
+/// let cloud = PointCloud::new(&points);
+/// let found = extract(&cloud, Neighborhood::Nearest(9), &ExtractOptions::default())?;
+/// assert_eq!(found.count[210], 9);
+/// assert!((found.radius_of(210) - 2_f64.sqrt()).abs() < 1e-6);
+///
+/// // A radius is a neighbourhood: the ball.
+/// assert_eq!(Neighborhood::from(Radius::new(2.0)?), Neighborhood::Ball(Radius::new(2.0)?));
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Neighborhood {
+    /// All points within a radius.
+    Ball(Radius),
+    /// The k nearest points, the query itself included where it is one of the cloud's. Of points that are
+    /// equally far, the first in the order of the lattice.
+    Nearest(usize),
+    /// The k nearest of the points within a radius.
+    Hybrid {
+        /// Of the ball.
+        radius: Radius,
+        /// At most this many points.
+        most: usize,
+    },
+}
+
+impl From<Radius> for Neighborhood {
+    fn from(radius: Radius) -> Self {
+        Self::Ball(radius)
+    }
+}
+
+impl Neighborhood {
+    pub(super) fn check(&self) -> Result<(), Error> {
+        match self {
+            Self::Nearest(0) | Self::Hybrid { most: 0, .. } => Err(Error::NoNeighbors),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A radius that holds k points around three quarters of the points, estimated at a few of them; later
+/// passes double it for those that need more.
+pub(super) fn first_radius(cloud: &PointCloud<'_>, k: usize, monitor: &Monitor) -> Result<Radius, Error> {
+    let positions: Vec<[f64; 3]> = (0..cloud.len()).filter_map(|i| cloud.position(i)).collect();
+    let largest = positions.iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
+    let step = positions.len().div_ceil(SAMPLES).max(1);
+    let mut distances = positions
+        .par_iter()
+        .step_by(step)
+        .map(|centre| {
+            monitor.check()?;
+            let square = |p: &[f64; 3]| (0..3).map(|a| (p[a] - centre[a]).powi(2)).sum::<f64>();
+            let mut squares: Vec<f64> = positions.iter().map(square).collect();
+            let nth = k.min(squares.len()) - 1;
+            Ok(squares.select_nth_unstable_by(nth, f64::total_cmp).1.sqrt())
+        })
+        .collect::<Result<Vec<f64>, Error>>()?;
+    distances.sort_unstable_by(f64::total_cmp);
+    let most = distances.get(3 * distances.len() / 4).copied().unwrap_or(1.0);
+    let found = distances.into_iter().find(|&d| d >= most && d > 0.0).unwrap_or(1.0);
+    // Not below what float64 can number at these coordinates.
+    Radius::new((1.05 * found).clamp(1e-12 * largest.max(1e-6), 1e17))
+}

@@ -1,0 +1,251 @@
+"""The compressed points of LAZ and COPC: where their chunks are, and decoding them with lazrs.
+
+lazrs believes a file: a size that is wrong makes it allocate gigabytes, panic, or end the whole process. So
+every size is compared with the file before lazrs sees it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import struct
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Any, BinaryIO, NamedTuple
+
+import numpy as np
+from laspy import LasHeader
+from laspy.copc import CopcInfoVlr
+from numpy.typing import NDArray
+
+from surfsig.errors import FileFormatError
+from surfsig.files.progress import Progress
+
+# Points are decoded in pieces of about so many bytes: several chunks, one for each thread.
+PIECE_BYTES = 32 << 20
+# A chunk larger than a piece is believed up to this ratio; real points reach 20.
+MAX_RATIO = 1000
+
+_COMPRESSOR_WITHOUT_CHUNKS = 1
+_ITEMS_START = 34
+_HIERARCHY_ENTRY = np.dtype(
+    [("level", "<i4"), ("cell", "<i4", 3), ("offset", "<u8"), ("size", "<i4"), ("points", "<i4")]
+)
+# Layers that each item of the point formats from 6 on is compressed in; of Byte14 one for each byte.
+_LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}
+_BYTE14 = 14
+
+
+class Chunk(NamedTuple):
+    """Points that are compressed together: where they stand in the file, and how many they are."""
+
+    offset: int
+    size: int
+    points: int
+
+
+@contextlib.contextmanager
+def one_line_errors(source: str) -> Iterator[None]:
+    """Turn whatever laspy and lazrs raise for a broken file into a `FileFormatError`."""
+    try:
+        yield
+    except (FileFormatError, OSError, MemoryError):
+        raise
+    except BaseException as error:
+        # A panic in Rust arrives as a class of its own that is no `Exception`, like Ctrl-C.
+        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
+            raise
+        text = " ".join(str(error).split())[:100]
+        raise FileFormatError(f"{source}: the LAS file is cut off or broken ({text})") from None
+
+
+def laz_chunks(file: BinaryIO, header: LasHeader, source: str, size: int) -> list[Chunk]:
+    """Find all chunks of a LAZ file of `size` bytes, in its order.
+
+    Raises
+    ------
+    FileFormatError
+        If they do not lie in the file, or do not hold the points that the header promises.
+    """
+    import lazrs
+
+    record = _laszip_record(header, source)
+    start = header.offset_to_point_data
+    if record[0] == _COMPRESSOR_WITHOUT_CHUNKS:
+        return [Chunk(start, size - start, header.point_count)]
+    table_start = _chunk_table_start(file, start, size, source)
+    file.seek(table_start)
+    _, count = struct.unpack("<II", file.read(8))
+    # Every chunk begins with a whole point.
+    if count > (table_start - start) // header.point_format.size:
+        raise FileFormatError(f"{source}: cut off or broken: its table promises {count} chunks")
+    file.seek(start)
+    with one_line_errors(source):
+        vlr = lazrs.LazVlr(record)
+        table = lazrs.read_chunk_table(file, vlr) if count else []
+    chunks, place, left = [], start + 8, header.point_count
+    for points, length in table:
+        # The last chunk's own number of points is not in a table of equal chunks.
+        held = points if vlr.uses_variable_size_chunks() else min(points, left)
+        chunks.append(Chunk(place, length, held))
+        place += length
+        left -= held
+    if place > table_start or left:
+        raise FileFormatError(
+            f"{source}: cut off or broken: its header promises {header.point_count} points, "
+            f"its chunks hold {header.point_count - left} in {place - start} bytes of {table_start - start}"
+        )
+    return [chunk for chunk in chunks if chunk.points]
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def copc_chunks(
+    file: BinaryIO, header: LasHeader, box: NDArray[np.float64], source: str, size: int
+) -> list[Chunk] | None:
+    """Find the chunks of the octree's nodes that touch a box, in the file's order.
+
+    Returns
+    -------
+    list of Chunk or None
+        None if the file is no COPC file, or its octree's cube does not enclose its points.
+
+    Raises
+    ------
+    FileFormatError
+        If the octree's pages or nodes do not lie in the file, or refer to themselves.
+    """
+    info = header.vlrs[0] if header.vlrs else None
+    if not isinstance(info, CopcInfoVlr):
+        return None
+    # A coordinate may be rounded out of its node by half a step.
+    margin = np.abs(header.scales)
+    low = info.center - info.halfsize
+    if not ((low - margin <= header.mins) & (low + 2 * info.halfsize + margin >= header.maxs)).all():
+        return None
+    _laszip_record(header, source)
+    pages = [(int(info.hierarchy_root_offset), int(info.hierarchy_root_size))]
+    chunks: list[Chunk] = []
+    seen = 0
+    while pages:
+        offset, length = pages.pop()
+        seen += length
+        if length < 0 or length % _HIERARCHY_ENTRY.itemsize or offset + length > size or seen > size:
+            raise FileFormatError(f"{source}: the COPC octree is cut off or broken: a page of {length} bytes")
+        file.seek(offset)
+        entries = np.frombuffer(file.read(length), _HIERARCHY_ENTRY)
+        entries = entries[entries["level"] >= 0]
+        side = 2 * info.halfsize * 2.0 ** -entries["level"][:, None].astype(np.float64)
+        corner = low + entries["cell"] * side
+        touches = ((corner - margin <= box[1]) & (corner + side + margin >= box[0])).all(axis=1)
+        for entry in entries[touches]:
+            place, length, points = (int(entry[name]) for name in ("offset", "size", "points"))
+            if points == -1:
+                pages.append((place, length))
+            elif points:
+                chunks.append(Chunk(place, length, points))
+    chunks.sort()
+    if (
+        any(chunk.size < 0 or chunk.points < 0 for chunk in chunks)
+        or any(first.offset + first.size > second.offset for first, second in pairwise(chunks))
+        or (chunks and chunks[-1].offset + chunks[-1].size > size)
+        or sum(chunk.points for chunk in chunks) > header.point_count
+    ):
+        raise FileFormatError(
+            f"{source}: the COPC octree is cut off or broken: its nodes hold more than the file"
+        )
+    return chunks
+
+
+def decoded(
+    file: BinaryIO, header: LasHeader, chunks: Sequence[Chunk], source: str, progress: Progress
+) -> Iterator[NDArray[Any]]:
+    """Decode chunks, several at a time and each in a thread of its own; give the points as records.
+
+    Raises
+    ------
+    FileFormatError
+        If a chunk is cut off or broken.
+    """
+    import lazrs
+
+    dtype = header.point_format.dtype()
+    record = _laszip_record(header, source)
+    layers = _layers(record, header)
+    for piece in _pieces(chunks, dtype.itemsize):
+        parts = []
+        for chunk in piece:
+            file.seek(chunk.offset)
+            parts.append(file.read(chunk.size))
+            _check_chunk(parts[-1], chunk, dtype.itemsize, layers, source)
+        points = np.zeros(sum(chunk.points for chunk in piece) * dtype.itemsize, np.uint8)
+        with one_line_errors(source):
+            lazrs.decompress_points_with_chunk_table(
+                b"".join(parts), record, points, [(chunk.points, chunk.size) for chunk in piece]
+            )
+        yield points.view(dtype)
+        progress.advance(sum(chunk.size for chunk in piece))
+
+
+def _laszip_record(header: LasHeader, source: str) -> bytes:
+    """Give the description of the compression, once it is that of the header's point format."""
+    import lazrs
+
+    kind = header.point_format
+    with one_line_errors(source):
+        found: bytes = header.vlrs[header.vlrs.index("LasZipVlr")].record_data
+        expected = lazrs.LazVlr.new_for_compression(kind.id, kind.num_extra_bytes).record_data()
+    # Items are (type, size, version); versions differ, and lazrs checks them.
+    items, usual = (
+        [data[start : start + 4] for start in range(_ITEMS_START, len(data), 6)] for data in (found, expected)
+    )
+    if items != usual or len(found) != len(expected):
+        raise FileFormatError(f"{source}: the LAZ compression is not that of point format {kind.id}")
+    return found
+
+
+def _chunk_table_start(file: BinaryIO, start: int, size: int, source: str) -> int:
+    """Find the table: its place stands before the points, or at the file's end if it was streamed."""
+    for place in (start, size - 8):
+        if place + 8 <= size:
+            file.seek(place)
+            (found,) = struct.unpack("<q", file.read(8))
+            if found > start:
+                if found + 8 <= size:
+                    return int(found)
+                break
+    raise FileFormatError(f"{source}: cut off: the table of its chunks is missing")
+
+
+def _pieces(chunks: Sequence[Chunk], point_size: int) -> Iterator[list[Chunk]]:
+    piece: list[Chunk] = []
+    size = 0
+    for chunk in chunks:
+        piece.append(chunk)
+        size += chunk.points * point_size
+        if size >= PIECE_BYTES:
+            yield piece
+            piece, size = [], 0
+    if piece:
+        yield piece
+
+
+def _layers(record: bytes, header: LasHeader) -> int:
+    """Count the layers that a chunk is compressed in: none before point format 6."""
+    if header.point_format.id < 6:
+        return 0
+    items = np.frombuffer(record[_ITEMS_START:], "<u2").reshape(-1, 3)
+    return sum(int(size) if item == _BYTE14 else _LAYERS[int(item)] for item, size, _ in items)
+
+
+def _check_chunk(data: bytes, chunk: Chunk, point_size: int, layers: int, source: str) -> None:
+    """Compare what a chunk promises with what it holds."""
+    promised = chunk.points * point_size
+    whole = len(data) == chunk.size >= point_size and promised <= max(PIECE_BYTES, MAX_RATIO * chunk.size)
+    if whole and layers:
+        # A whole point, the number of points, each layer's size, the layers.
+        before = point_size + 4 + 4 * layers
+        sizes = np.frombuffer(data[point_size + 4 : before].ljust(4 * layers, b"\xff"), "<u4")
+        whole = before + int(sizes.sum(dtype=np.uint64)) <= len(data)
+    if not whole:
+        raise FileFormatError(
+            f"{source}: cut off or broken: a chunk promises {chunk.points} points in {chunk.size} bytes"
+        )
