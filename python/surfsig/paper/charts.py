@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._surfsig import GOOD, OPTIMAL
-from ..extraction import extract
+from ..curvature import extract
 from ..plot import draw_points, view_axes
 from ..similarity import similarity
 from ..simulate import paper_acquisition

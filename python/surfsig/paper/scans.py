@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ..curvature import extract
 from ..defaults import Axes
-from ..extraction import extract
 from ..point_cloud import PointCloud
 from ..simulate import Hits, Jitter, Scanner, Scene, paper_acquisition
 from ..simulate.acquisitions import Acquisition, Poses
