@@ -1,5 +1,6 @@
 """pandas DataFrames and Arrow tables, in and out."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +16,8 @@ from surfsig import InvalidInputError, PointCloud
 POINTS = np.array([[0, 1, 2], [3, 4, 5], [6, 7, np.nan], [9, 10, 11]], np.float32)
 COLUMNS = [
     *("k1", "k2", "gaussian_curvature", "mean_curvature", "nx", "ny", "nz"),
-    *("direction_x", "direction_y", "direction_z", "residual", "condition", "count", "status"),
+    *("direction_x", "direction_y", "direction_z", "mean_curvature_std", "k1_std", "k2_std", "noise"),
+    *("residual", "condition", "count", "status"),
     *("linearity", "planarity", "scattering"),
 ]
 
@@ -203,7 +205,7 @@ def test_an_extraction_in_arrow(extraction: surfsig.Extraction, tmp_path: Path) 
     assert table.column_names == ["x", "y", "z", *COLUMNS]
     for name, values in extraction.columns().items():
         np.testing.assert_array_equal(table.column(name), values)
-    assert table.schema.metadata[b"surfsig"] == b'{"radius": "0.6", "axes": "surface"}'
+    assert json.loads(table.schema.metadata[b"surfsig"]) == {"radius": "0.6", "axes": "surface"}
     surfsig.write(tmp_path / "a.parquet", table)
     np.testing.assert_array_equal(surfsig.read(tmp_path / "a.parquet").fields["k1"], extraction.k1)
 

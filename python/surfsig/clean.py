@@ -7,14 +7,13 @@ SciPy's (BSD, 140 MB installed); Open3D's (300 MB) takes longer than either.
 
 from __future__ import annotations
 
-import operator
 import os
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfsig.arguments import positive_length, thread_count
+from surfsig.arguments import MOST_NEIGHBORS, positive_length, thread_count, whole_number
 from surfsig.convert.libraries import library
 from surfsig.defaults import OUTLIER_NEIGHBORS, OUTLIER_STD_RATIO
 from surfsig.errors import InvalidInputError
@@ -147,12 +146,11 @@ def remove_outliers(
     InvalidInputError
         If an argument has no meaning, or small_gicp is not installed.
     """
+    neighbors = whole_number(neighbors, "neighbors", MOST_NEIGHBORS)
     try:
-        neighbors, ratio = operator.index(neighbors), float(std_ratio)
+        ratio = float(std_ratio)
     except (TypeError, ValueError):
-        raise InvalidInputError("neighbors must be a whole number, and std_ratio a number") from None
-    if neighbors < 1:
-        raise InvalidInputError(f"neighbors must be 1 or more, not {neighbors}")
+        raise InvalidInputError(f"std_ratio must be a number, not {std_ratio!r:.40}") from None
     if not 0 <= ratio < np.inf:
         raise InvalidInputError(f"std_ratio must be a finite number from 0 on, not {ratio:g}")
     cloud = _finite_part(PointCloud.of(cloud))
@@ -160,7 +158,7 @@ def remove_outliers(
     # With two points, both are as far from their nearest: there is nothing to compare.
     if len(cloud) < 3:
         return cloud
-    if np.abs(cloud.offsets).max() > COORDINATE_LIMIT:
+    if float(np.abs(cloud.offsets).max()) > COORDINATE_LIMIT:
         raise InvalidInputError(f"coordinates must be within {COORDINATE_LIMIT:g} to measure distances")
     distances = _neighbour_distances(cloud.offsets, min(neighbors, len(cloud) - 1), workers)
     limit = distances.mean() + ratio * distances.std(ddof=1)
