@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from typing import Any, BinaryIO, Protocol
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError, InvalidInputError
-from surfsig.files import e57, e57_writer, las, las_write, numpy_files, parquet, pcd, ply, text
+from surfsig.files import e57, e57_writer, numpy_files, parquet, pcd, ply, text
 from surfsig.files.columns import Chunks
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
@@ -89,6 +90,20 @@ def _is_text(head: bytes) -> bool:
     return 0 not in head and controls * 50 <= len(head)
 
 
+def _imported(module: str, function: str) -> Callable[..., Any]:
+    """Give a function of a module here that is imported when it is called: its library takes a while."""
+
+    def call(*arguments: Any, **options: Any) -> Any:
+        found = importlib.import_module(f"surfsig.files.{module}")
+        return getattr(found, function)(*arguments, **options)
+
+    return call
+
+
+# Bit 7 of the point format's number says that the points are compressed.
+_LAZ = re.compile(rb"LASF.{100}[\x80-\xff]", re.DOTALL)
+_read_las = _imported("las", "read")
+
 _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
 
 # The order matters: text comes last, because every PCD header and every HTML page is text as well.
@@ -107,8 +122,10 @@ FORMATS = (
     Format(
         "Parquet", (".parquet",), _begins(parquet.MAGIC), parquet.read, parquet.write, parquet.check_available
     ),
-    Format("LAZ", (".laz",), _matches(las.LAZ_MAGIC), las.read, las_write.write_laz, takes=("box",)),
-    Format("LAS", (".las",), _begins(las.MAGIC), las.read, las_write.write_las, takes=("box",)),
+    Format("LAZ", (".laz",), _matches(_LAZ), _read_las, _imported("las_write", "write_laz"), takes=("box",)),
+    Format(
+        "LAS", (".las",), _begins(b"LASF"), _read_las, _imported("las_write", "write_las"), takes=("box",)
+    ),
     Format("E57", (".e57",), _begins(e57.MAGIC), e57.read, e57_writer.write, takes=("scan",)),
     Format("PNG image", (".png",), _begins(b"\x89PNG")),
     Format("JPEG image", (".jpg", ".jpeg"), _begins(b"\xff\xd8\xff")),
