@@ -1,4 +1,4 @@
-"""The command line: `surfsig info`, `extract`, `compare`, `paper`, `completion`.
+"""The command line: `surfsig info`, `extract`, `compare`, `convert`, `paper`, `completion`.
 
 Each command is a file here that calls the library's public functions and prints; `run` turns everything that
 can go wrong into one line and an exit code.
@@ -14,6 +14,7 @@ import click
 
 from surfsig.cli.compare import compare_command
 from surfsig.cli.completion import completion_command
+from surfsig.cli.convert import convert_command
 from surfsig.cli.extract import extract_command
 from surfsig.cli.info import info_command
 from surfsig.cli.paper import paper_command
@@ -42,7 +43,14 @@ def command_line() -> None:
     """  # noqa: D301 - \b is click's mark for lines to be kept as they are
 
 
-for command in (info_command, extract_command, compare_command, paper_command, completion_command):
+for command in (
+    info_command,
+    extract_command,
+    compare_command,
+    convert_command,
+    paper_command,
+    completion_command,
+):
     command_line.add_command(command)
 
 
