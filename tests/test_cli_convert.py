@@ -21,7 +21,7 @@ def millimetres(ball: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("extension", ["ply", "npz", "parquet"])
+@pytest.mark.parametrize("extension", ["ply", "pcd", "npz", "parquet"])
 def test_everything_is_kept(shell: Callable[..., Any], tmp_path: Path, extension: str) -> None:
     if extension == "parquet":
         pytest.importorskip("pyarrow")

@@ -43,7 +43,9 @@ QUANTILES = (0.05, 0.5, 0.95)
     metavar="K",
     help="In place of --radius, the K nearest points; with --radius, at most so many of those within it.",
 )
-@click.option("-o", "--output", type=CLOUD, required=True, help="A .ply, .las, .laz, .npz or .parquet file.")
+@click.option(
+    "-o", "--output", type=CLOUD, required=True, help="A .ply, .pcd, .las, .laz, .npz or .parquet file."
+)
 @click.option("--signatures", is_flag=True, help="Write the signature of each point too (242 numbers).")
 @click.option(
     "--like",

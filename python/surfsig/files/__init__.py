@@ -145,27 +145,27 @@ def write(
     notes: Mapping[str, str] | None = None,
     progress: ProgressCallback | None = None,
 ) -> None:
-    """Write a cloud with further columns: PLY, LAS, LAZ, NPZ or Parquet, by the extension.
+    """Write a cloud with further columns: PLY, PCD, LAS, LAZ, NPZ or Parquet, by the extension.
 
     The file appears whole or not at all: a failure (a full disk) leaves an old file as it was.
 
     Parameters
     ----------
     path
-        The file; ``.ply``, ``.las``, ``.laz``, ``.npz`` or ``.parquet``.
+        The file; ``.ply``, ``.pcd``, ``.las``, ``.laz``, ``.npz`` or ``.parquet``.
     cloud
-        Its points come first (in PLY as double where float would change one of them; in LAS and LAZ rounded
-        to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields.
+        Its points come first (in PLY and PCD as double where float would change one of them; in LAS and LAZ
+        rounded to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields.
     columns
         (n,) or (n, k) numbers by name. ``normals`` (n, 3) are written as nx, ny, nz and ``colors`` (n, 3 or
-        4) as red, green, blue (and alpha). Any other (n, k) column stays one in NPZ and Parquet, and becomes
-        NAME_0, NAME_1, ... in PLY, LAS and LAZ. A field of the cloud with the same name is kept as
-        ``input_NAME``.
+        4) as red, green, blue (and alpha); PCD packs colours of uint8 into ``rgb`` or ``rgba``. Any other (n, k)
+        column stays one in PCD, NPZ and Parquet, and becomes NAME_0, NAME_1, ... in PLY, LAS and LAZ. A field
+        of the cloud with the same name is kept as ``input_NAME``.
     chunks
         One more column, (n, width), given block by block so that it need not fit in memory.
     notes
-        Words about the whole file (PLY comments, Parquet metadata, a record of LAS, the array ``notes`` of
-        NPZ, as JSON).
+        Words about the whole file (PLY and PCD comments, Parquet metadata, a record of LAS, the array
+        ``notes`` of NPZ, as JSON).
     progress
         Called with the points written so far and their number.
 
