@@ -1,5 +1,4 @@
-"""The command line: `surfsig info`, `clean`, `extract`, `compare`, `convert`,
-`paper`, `completion`.
+"""The command line: `surfsig info`, `clean`, `convert`, `extract`, `compare`, `paper`, `completion`.
 
 Each command is a file here that calls the library's public functions and prints; `run` turns everything that
 can go wrong into one line and an exit code.

@@ -154,8 +154,8 @@ def write(
     path
         The file; ``.ply``, ``.pcd``, ``.las``, ``.laz``, ``.e57``, ``.npz`` or ``.parquet``.
     cloud
-        Its points come first (in PLY, PCD and E57 as double where float would change one of them; in LAS and LAZ
-        rounded to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields. In E57 its
+        Its points come first (in PLY, PCD and E57 as double where float would change one of them; in LAS and
+        LAZ rounded to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields. In E57 its
         viewpoint, or its viewpoints, become the poses of its scans. Or what else `PointCloud.of` takes.
     columns
         (n,) or (n, k) numbers by name. ``normals`` (n, 3) are written as nx, ny, nz and ``colors`` (n, 3 or
@@ -165,8 +165,8 @@ def write(
     chunks
         One more column, (n, width), given block by block so that it need not fit in memory.
     notes
-        Words about the whole file (PLY and PCD comments, a record of LAS; as JSON in Parquet's metadata, the array
-        ``notes`` of NPZ, the description of an E57 scan).
+        Words about the whole file (PLY and PCD comments, a record of LAS; as JSON in Parquet's metadata, the
+        array ``notes`` of NPZ, the description of an E57 scan).
     progress
         Called with the points written so far and their number.
 
