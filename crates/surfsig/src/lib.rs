@@ -47,7 +47,7 @@ pub use error::Error;
 pub use extract::{
     ExtractOptions, Extraction, Monitor, Queries, Status, extract, extract_monitored, voxel_representatives,
 };
-pub use fit::FitAxes;
+pub use fit::{Cylinder, FitAxes, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere};
 pub use frame::{Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use point_cloud::{Offsets, PointCloud, Radius};

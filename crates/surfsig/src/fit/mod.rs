@@ -1,7 +1,16 @@
 //! Surfaces read off moments.
 
 mod covariance;
+mod cylinder;
+mod eigen;
+mod implicit;
 pub(crate) mod paraboloid;
+pub(crate) mod quadric;
+mod sphere;
+mod taubin;
 pub(crate) mod tensor;
 
+pub use cylinder::{Cylinder, fit_cylinder};
+pub use implicit::{Quadric, SurfacePoint, fit_quadric};
 pub use paraboloid::FitAxes;
+pub use sphere::{Sphere, fit_sphere};

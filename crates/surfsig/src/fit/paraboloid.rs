@@ -137,7 +137,7 @@ fn fit(task: &Task<'_>) -> Paraboloids {
 impl Task<'_> {
     /// Towards the sensor, from what is known of it, for surfaces with these normals.
     #[inline(always)]
-    fn towards_sensor(&self, normal: &Vector) -> Vector {
+    pub(super) fn towards_sensor(&self, normal: &Vector) -> Vector {
         match (self.to_sensor, self.axes) {
             (Some(to_sensor), _) => to_sensor,
             // The paper's z runs away from the sensor.
