@@ -147,3 +147,58 @@ fn descend(pencil: &Pencil, start: Vector3<f64>) -> Option<(Vector3<f64>, Best)>
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::samples::{Draws, Shape, turned};
+    use nalgebra::Rotation3;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 100, ..Default::default() })]
+
+        #[test]
+        fn is_exact_on_cylinders_anywhere(
+            radius in 0.15_f64..20.0,
+            turn in prop::array::uniform3(-4.0_f64..4.0),
+            place in prop::array::uniform3(-20.0_f64..20.0),
+            unit in prop::sample::select(vec![1e-3, 1.0, 1e3]),
+        ) {
+            let points = Shape::Cylinder(radius).points(80, -1.0, 0.0, &mut Draws(3));
+            let rotation = Rotation3::new(Vector3::from(turn));
+            let local = Moments::<f64>::of_points(&turned(&points, &rotation));
+            let cylinder = fit_cylinder(&local.shifted(place).scaled(unit)).unwrap();
+            let tolerance = 1e-6 * radius.max(1.0);
+            prop_assert!((cylinder.radius / unit - radius).abs() < tolerance, "{} {radius}", cylinder.radius);
+            let axis = rotation * Vector3::y();
+            prop_assert!(Vector3::from(cylinder.axis).cross(&axis).norm() < tolerance);
+            let on_axis = rotation * Vector3::new(0.0, 0.0, -radius) + Vector3::from(place);
+            let aside = (Vector3::from(cylinder.centre) / unit - on_axis).cross(&axis).norm();
+            prop_assert!(aside < 10.0 * tolerance, "{aside}");
+        }
+    }
+
+    #[test]
+    fn noise_does_not_bias_it() {
+        let (mut draws, mut radii, mut squares) = (Draws(4), 0.0, 0.0);
+        for _ in 0..500 {
+            let points = Shape::Cylinder(1.0).points(200, -1.0, 0.01, &mut draws);
+            let cylinder = fit_cylinder(&Moments::of_points(&points)).unwrap();
+            radii += cylinder.radius / 500.0;
+            squares += cylinder.residual.powi(2) / 500.0;
+        }
+        assert!((radii - 1.0).abs() < 0.004, "{radii}");
+        // Five parameters are fitted to 200 points.
+        assert!((squares.sqrt() / 0.01 - 0.975_f64.sqrt()).abs() < 0.01, "{squares}");
+    }
+
+    #[test]
+    fn what_determines_no_cylinder_is_none() {
+        let none = |points: &[[f64; 3]]| fit_cylinder(&Moments::of_points(points)).is_none();
+        assert!(none(&[]));
+        assert!(none(&[[0.0, 0.0, 1.0]; 9]));
+        assert!(none(&[[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0; 3]]));
+        assert!(none(&Shape::Plane.points(60, -1.0, 0.0, &mut Draws(5))));
+    }
+}

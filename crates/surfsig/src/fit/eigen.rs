@@ -10,11 +10,11 @@ pub(super) type Terms = [Lanes; TERMS];
 
 /// Iterations after which a fit has not converged. The error falls by the third over the first
 /// eigenvalue each time: by 4 at least where the quadric can be used at all.
-const MAX_ITERATIONS: usize = 14;
+const MAX_ITERATIONS: usize = 10;
 
 /// Change of the smallest eigenvalue, relative to it, that ends the iteration: the vector is then
 /// right to its root.
-const SETTLED: f64 = 1e-13;
+const SETTLED: f64 = 1e-11;
 
 /// What rounding makes of an eigenvalue 0, in squares of the radius.
 const ROUNDING: f64 = 1e-17;
@@ -128,9 +128,11 @@ impl<'a> Pencil<'a> {
     fn forward(&self, x: &Terms) -> Terms {
         let mut y = *x;
         for i in 1..TERMS {
+            let mut value = y[i];
             for k in 0..i {
-                y[i] = (-self.lower[i][k]).mul_add(y[k], y[i]);
+                value = (-self.lower[i][k]).mul_add(y[k], value);
             }
+            y[i] = value;
         }
         y
     }
@@ -139,10 +141,11 @@ impl<'a> Pencil<'a> {
     fn solve(&self, x: &Terms) -> Terms {
         let mut y = self.forward(x);
         for i in (0..TERMS).rev() {
-            y[i] = y[i] * self.inverse_pivot[i];
+            let mut value = y[i] * self.inverse_pivot[i];
             for k in i + 1..TERMS {
-                y[i] = (-self.lower[k][i]).mul_add(y[k], y[i]);
+                value = (-self.lower[k][i]).mul_add(y[k], value);
             }
+            y[i] = value;
         }
         y
     }
@@ -163,7 +166,7 @@ impl<'a> Pencil<'a> {
     pub fn smallest(&self, normal: &[Lanes; 3]) -> Smallest {
         let zero = Lanes::ZERO;
         let mut first = [normal[0], normal[1], normal[2], zero, zero, zero, zero, zero, zero];
-        let mut second = [0.0, 0.0, 0.0, 1.0, 0.3, -0.4, 0.8, 0.5, 1.2].map(Lanes::splat);
+        let second = [0.0, 0.0, 0.0, 1.0, 0.3, -0.4, 0.8, 0.5, 1.2].map(Lanes::splat);
         let (mut first_dual, mut second_dual) = (self.gradient_form(&first), self.gradient_form(&second));
         let (mut value, mut next) = (Lanes::splat(f64::MAX), Lanes::splat(f64::MAX));
         let mut active = Mask::ALL;
@@ -176,9 +179,7 @@ impl<'a> Pencil<'a> {
             let (a, a_dual) = self.normalised(&a);
             let mut b = self.solve(&second_dual);
             let overlap = dot_terms(&b, &a_dual);
-            for i in 0..TERMS {
-                b[i] = (-overlap).mul_add(a[i], b[i]);
-            }
+            b = combined(Lanes::ONE, &b, -overlap, &a);
             let (b, b_dual) = self.normalised(&b);
             // Rayleigh and Ritz: the best of the subspace first.
             let image = self.variance_form(&a);
@@ -188,15 +189,12 @@ impl<'a> Pencil<'a> {
             let shift = tangent * ab;
             let (aa, bb) = (aa - shift, bb + shift);
             let swap = bb.lt(aa);
-            for i in 0..TERMS {
-                let turned = (cosine * a[i] - sine * b[i], sine * a[i] + cosine * b[i]);
-                let dual = (cosine * a_dual[i] - sine * b_dual[i], sine * a_dual[i] + cosine * b_dual[i]);
-                // A lane that has settled stays as it is, whatever its neighbours in the batch need.
-                first[i] = active.select(swap.select(turned.1, turned.0), first[i]);
-                second[i] = active.select(swap.select(turned.0, turned.1), second[i]);
-                first_dual[i] = active.select(swap.select(dual.1, dual.0), first_dual[i]);
-                second_dual[i] = active.select(swap.select(dual.0, dual.1), second_dual[i]);
-            }
+            let (of_a, of_b) = (swap.select(sine, cosine), swap.select(cosine, -sine));
+            // A lane that has settled keeps its answer, whatever its neighbours in the batch need.
+            first = chosen_terms(active, &combined(of_a, &a, of_b, &b), &first);
+            first_dual = chosen_terms(active, &combined(of_a, &a_dual, of_b, &b_dual), &first_dual);
+            let (of_a, of_b) = (swap.select(cosine, sine), swap.select(-sine, cosine));
+            second_dual = combined(of_a, &a_dual, of_b, &b_dual);
             let change = (value - aa.min(bb)).abs();
             value = active.select(aa.min(bb), value);
             next = active.select(aa.max(bb), next);
@@ -238,4 +236,24 @@ pub(super) fn dot_terms(x: &Terms, y: &Terms) -> Lanes {
 #[inline(always)]
 pub(super) fn hessian(x: &Terms) -> [[Lanes; 3]; 3] {
     [[x[3] + x[3], x[4], x[5]], [x[4], x[6] + x[6], x[7]], [x[5], x[7], x[8] + x[8]]]
+}
+
+/// `p x + q y`
+#[inline(always)]
+pub(super) fn combined(p: Lanes, x: &Terms, q: Lanes, y: &Terms) -> Terms {
+    let mut sum = [Lanes::ZERO; TERMS];
+    for i in 0..TERMS {
+        sum[i] = p.mul_add(x[i], q * y[i]);
+    }
+    sum
+}
+
+/// `x` where the mask is set, `y` elsewhere.
+#[inline(always)]
+fn chosen_terms(mask: Mask, x: &Terms, y: &Terms) -> Terms {
+    let mut chosen = [Lanes::ZERO; TERMS];
+    for i in 0..TERMS {
+        chosen[i] = mask.select(x[i], y[i]);
+    }
+    chosen
 }

@@ -6,6 +6,8 @@ mod eigen;
 mod implicit;
 pub(crate) mod paraboloid;
 pub(crate) mod quadric;
+#[cfg(test)]
+mod samples;
 mod sphere;
 mod taubin;
 pub(crate) mod tensor;

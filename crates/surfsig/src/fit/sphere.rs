@@ -48,3 +48,57 @@ pub fn fit_sphere(moments: &Moments<f64>) -> Option<Sphere> {
         residual: placement.unit * best.mean_square.sqrt(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::samples::{Draws, Shape, turned};
+    use nalgebra::{Rotation3, Vector3};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn is_exact_on_spheres_anywhere(
+            radius in 0.4_f64..100.0,
+            turn in prop::array::uniform3(-4.0_f64..4.0),
+            place in prop::array::uniform3(-50.0_f64..50.0),
+            unit in prop::sample::select(vec![1e-3, 1.0, 1e3]),
+        ) {
+            let points = Shape::Sphere(radius).points(50, -1.0, 0.0, &mut Draws(3));
+            let rotation = Rotation3::new(Vector3::from(turn));
+            let local = Moments::<f64>::of_points(&turned(&points, &rotation));
+            let sphere = fit_sphere(&local.shifted(place).scaled(unit)).unwrap();
+            // The sphere's top is at the origin. Its depth has digits as it stands out of rounding.
+            let tolerance = 1e-8 * radius.powi(3).max(1.0) * unit;
+            prop_assert!((sphere.radius - unit * radius).abs() < tolerance, "{} {radius}", sphere.radius);
+            let centre = (rotation * Vector3::new(0.0, 0.0, -radius) + Vector3::from(place)) * unit;
+            prop_assert!((Vector3::from(sphere.centre) - centre).norm() < tolerance);
+            prop_assert!(sphere.residual < 1e-5 * unit);
+        }
+    }
+
+    #[test]
+    fn noise_does_not_bias_it() {
+        let (mut draws, mut radii, mut squares) = (Draws(4), 0.0, 0.0);
+        for _ in 0..500 {
+            let points = Shape::Sphere(1.5).points(200, -1.0, 0.01, &mut draws);
+            let sphere = fit_sphere(&Moments::of_points(&points)).unwrap();
+            radii += sphere.radius / 500.0;
+            squares += sphere.residual.powi(2) / 500.0;
+        }
+        assert!((radii - 1.5).abs() < 0.006, "{radii}");
+        // Four parameters are fitted to 200 points.
+        assert!((squares.sqrt() / 0.01 - 0.98_f64.sqrt()).abs() < 0.01, "{squares}");
+    }
+
+    #[test]
+    fn what_determines_no_sphere_is_none() {
+        let mut draws = Draws(5);
+        let none = |points: &[[f64; 3]]| fit_sphere(&Moments::of_points(points)).is_none();
+        assert!(none(&[]));
+        assert!(none(&[[0.0, 0.0, 1.0]; 9]));
+        assert!(none(&[[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]));
+        assert!(none(&[[f64::NAN; 3]; 9]));
+        assert!(none(&Shape::Plane.points(60, -1.0, 0.0, &mut draws)));
+    }
+}
