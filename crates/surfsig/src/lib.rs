@@ -27,6 +27,7 @@
 //!
 //! The way of the data, room by room: [`PointCloud`] -> [`CellIndex`] -> [`Moments`] -> paraboloid
 //! ([`FitAxes`]) -> curvature ([`Paraboloid`]) -> [`Frame`] -> [`similarity`]; [`extract()`] walks it.
+//! [`fit_sphere`], [`fit_cylinder`] and [`fit_quadric`] read other surfaces off the same moments.
 
 mod ball;
 mod cell_index;

@@ -34,6 +34,7 @@ pub(super) struct Pencil<'a> {
 /// The smallest eigenvalue with its vector, and the next one.
 pub(super) struct Smallest {
     pub value: Lanes,
+    /// From above: settled only as far as `value` needed iterations, so the less the wider the gap is.
     pub next: Lanes,
     pub vector: Terms,
     /// The gradient's form times the vector.

@@ -16,8 +16,8 @@ pub struct Quadric {
     pub coefficients: [f64; 10],
     /// Root mean square of the points' distances, to first order.
     pub residual: f64,
-    /// By how much the next best quadric's mean square exceeds this one's. Below about 4, as on a
-    /// plane, the points do not tell which quadric they lie on.
+    /// By how much the next best quadric's mean square exceeds this one's, less where points are few.
+    /// Below 4, as on a plane, the points do not tell which quadric they lie on.
     pub gap: f64,
     /// Root mean square of the points' distances from their mean.
     pub extent: f64,
@@ -40,7 +40,8 @@ pub struct SurfacePoint {
 
 /// The quadric of a set of points with Taubin's normalisation.
 ///
-/// Exact on points that lie on a quadric. `None` for fewer than 9 points, and where nothing settles.
+/// Exact on points that lie on a quadric. The moments should be those about a place near the points, as
+/// for a sphere. `None` for fewer than 9 points, and where nothing settles.
 ///
 /// ```
 /// use surfsig::{fit_quadric, Moments};
@@ -141,5 +142,56 @@ impl Quadric {
         moved[0] = self.value(place);
         moved[1..4].copy_from_slice(&self.gradient(place));
         moved
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::samples::{Draws, Shape, turned};
+    use nalgebra::{Rotation3, Vector3};
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 64, rng_seed: prop::test_runner::RngSeed::Fixed(6), ..Default::default() })]
+
+        #[test]
+        fn place_turn_and_unit_change_nothing(
+            turn in prop::array::uniform3(-4.0_f64..4.0),
+            place in prop::array::uniform3(-5.0_f64..5.0),
+            unit in prop::sample::select(vec![1e-3, 1.0, 1e3]),
+        ) {
+            let shape = Shape::Ellipsoid([0.8, 1.2, 1.0]);
+            let points = shape.points(200, -1.0, 0.002, &mut Draws(2));
+            let expected = fit_quadric(&Moments::of_points(&points)).unwrap();
+            let rotation = Rotation3::new(Vector3::from(turn));
+            let moved = Moments::<f64>::of_points(&turned(&points, &rotation)).shifted(place).scaled(unit);
+            let found = fit_quadric(&moved).unwrap();
+            prop_assert!((found.residual / unit - expected.residual).abs() < 1e-6 * expected.residual);
+            // Where the gap is wide, the iteration ends before the next eigenvalue has settled.
+            prop_assert!((found.gap / expected.gap).ln().abs() < 0.5, "{} {}", found.gap, expected.gap);
+            prop_assert!((found.extent / unit - expected.extent).abs() < 1e-9);
+            let [from, to] = [[0.0, 0.0, 0.1], (rotation * Vector3::new(0.0, 0.0, 0.1) + Vector3::from(place)).into()];
+            let near = expected.nearest(from).unwrap();
+            let other = found.nearest(to.map(|c| unit * c)).unwrap();
+            // The gradient's side is that of the eigenvector, which means nothing.
+            let side = (rotation * Vector3::from(near.normal)).dot(&Vector3::from(other.normal)).signum();
+            let ks = if side > 0.0 { [other.k1, other.k2] } else { [-other.k2, -other.k1] };
+            prop_assert!((ks[0] * unit - near.k1).abs() < 1e-4 && (ks[1] * unit - near.k2).abs() < 1e-4);
+            prop_assert!((found.value(other.position) / unit).abs() < 1e-7);
+            let distance = Vector3::from(other.position) / unit - Vector3::from(to);
+            prop_assert!((distance - rotation * (Vector3::from(near.position) - Vector3::from(from))).norm() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn what_determines_no_quadric_is_none() {
+        let none = |points: &[[f64; 3]]| fit_quadric(&Moments::of_points(points)).is_none();
+        assert!(none(&[]));
+        assert!(none(&[[0.5, 0.0, 1.0]; 20]));
+        assert!(none(&Shape::Sphere(1.0).points(8, -1.0, 0.0, &mut Draws(1))));
+        assert!(none(&[[f64::INFINITY, 0.0, 0.0]; 20]));
+        let plane = fit_quadric(&Moments::of_points(&Shape::Plane.points(90, -1.0, 0.01, &mut Draws(1))));
+        assert!(plane.is_none_or(|fit| fit.gap < 4.0));
     }
 }

@@ -26,7 +26,15 @@ const ON_SURFACE: f64 = 1e-7;
 /// Added to the smallest eigenvalue before the next is divided by it: float32 offsets make as much.
 const FLOOR: f64 = 1e-15;
 
+/// A gap from which the quadric is not that of the noise: on planes it is 2, on half a disc and where the
+/// surface rises by less than about 15 times the noise it is below 4.
+const TRUSTED_GAP: f64 = 4.0;
+
+/// A paraboloid's curvature k is too large by about this times k^3, in units of the ball's radius.
+const PARABOLOID_BIAS: f64 = 0.25;
+
 /// The fits of a batch, lengths in units of the radius.
+#[allow(dead_code, reason = "the extraction reads all of it once it offers this fit")]
 pub(crate) struct Quadrics {
     /// At the foot of the query, its projection onto the surface.
     pub principal: Principal,
@@ -35,7 +43,8 @@ pub(crate) struct Quadrics {
     pub coefficients: [Lanes; TERMS + 1],
     /// Root mean square of the distance, to first order.
     pub residual: Lanes,
-    /// Next eigenvalue over the smallest.
+    /// Next eigenvalue over the smallest, lower the fewer points are left over by the unknowns: few
+    /// points lie near some quadric by chance.
     pub gap: Lanes,
     /// Standard errors of k1, k2 and the mean curvature, from the residual and the points' arrangement.
     pub errors: [Lanes; 3],
@@ -43,6 +52,10 @@ pub(crate) struct Quadrics {
     pub settled: Mask,
     /// Settled, and with a foot inside the ball.
     pub converged: Mask,
+    /// Converged, and with a gap that makes the standard errors those of many draws.
+    pub trusted: Mask,
+    /// Trusted, and less wrong than a paraboloid, whose spread is smaller and whose bias is larger.
+    pub preferred: Mask,
 }
 
 for_each_instruction_set! {
@@ -68,18 +81,30 @@ fn fit(task: &Task<'_>) -> Quadrics {
     let local = Local::at_foot(constant, terms);
     let away_from_sensor = dot(&local.normal, &task.towards_sensor(&local.normal)).lt(Lanes::ZERO);
     let principal = local.principal(away_from_sensor);
-    let settled = smallest.converged & Lanes::splat(UNKNOWNS as f64).le(moments.count);
     let in_ball = dot(&local.foot, &local.foot).le(Lanes::ONE);
+    let unknowns = Lanes::splat(UNKNOWNS as f64);
+    let settled = smallest.converged & unknowns.le(moments.count);
+    let converged = settled & local.on_surface & in_ball;
+    let left_over = ((moments.count - unknowns) / moments.count).max(Lanes::ZERO);
+    let gap = left_over * left_over * smallest.next / (smallest.value + Lanes::splat(FLOOR));
+    let trusted = converged & Lanes::splat(TRUSTED_GAP).le(gap);
+    let errors = standard_errors(task, &pencil, &smallest, &local, &principal);
+    let (size1, size2) = (principal.k1.abs(), principal.k2.abs());
+    let larger = size1.max(size2);
+    let error = size1.lt(size2).select(errors[1], errors[0]);
+    let bias = larger * larger * larger * Lanes::splat(PARABOLOID_BIAS);
     let [x, y, z, xx, xy, xz, yy, yz, zz] = *terms;
     Quadrics {
-        errors: standard_errors(task, &pencil, &smallest, &local, &principal),
         principal,
         foot: local.foot,
         coefficients: [constant, x, y, z, xx, xy, xz, yy, yz, zz],
         residual: smallest.value.sqrt(),
-        gap: smallest.next / (smallest.value + Lanes::splat(FLOOR)),
+        gap,
         settled,
-        converged: settled & local.on_surface & in_ball,
+        converged,
+        errors,
+        trusted,
+        preferred: trusted & error.le(bias),
     }
 }
 

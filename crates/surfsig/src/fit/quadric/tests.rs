@@ -1,7 +1,7 @@
 //! Against formulas, a general eigen-decomposition, and draws of noise.
 
 use super::*;
-use crate::fit::paraboloid::FitAxes;
+use crate::fit::paraboloid::{FitAxes, fit_paraboloids};
 use crate::fit::samples::{Draws, Point, Shape, turned};
 use crate::fit::taubin;
 use crate::fit::tensor::MomentBatch;
@@ -33,11 +33,25 @@ fn shape() -> impl Strategy<Value = Shape> {
 
 /// All that is said of one lane, as bits.
 fn bits(fits: &Quadrics, lane: usize) -> Vec<u64> {
-    let Quadrics { principal, foot, coefficients, residual, gap, errors, settled, converged } = fits;
+    let Quadrics {
+        principal,
+        foot,
+        coefficients,
+        residual,
+        gap,
+        errors,
+        settled,
+        converged,
+        trusted,
+        preferred,
+    } = fits;
     let vectors = [principal.normal, principal.direction, *foot, *errors];
     let scalars = [principal.k1, principal.k2, *residual, *gap];
     let numbers = vectors.iter().flatten().chain(coefficients).chain(&scalars);
-    numbers.map(|v| v.0[lane].to_bits()).chain([settled, converged].map(|m| m.get(lane).into())).collect()
+    numbers
+        .map(|v| v.0[lane].to_bits())
+        .chain([settled, converged, trusted, preferred].map(|m| m.get(lane).into()))
+        .collect()
 }
 
 proptest! {
@@ -115,30 +129,50 @@ fn a_lane_knows_nothing_of_its_neighbours() {
     assert!(!together.converged.get(0) && !together.converged.get(4));
 }
 
-/// Mean and standard deviation of k1, k2 and H over draws, and the root mean square of their errors.
+/// Over the draws that are trusted: mean and standard deviation of k1, k2 and H, and the root mean
+/// square of the errors said.
 struct Study {
     mean: [f64; 3],
     deviation: [f64; 3],
     error: [f64; 3],
-    /// 5th percentile, median and 95th percentile.
+    /// 5th percentile, median and 95th percentile, of all draws.
     gap: [f64; 3],
-    converged: f64,
+    trusted: f64,
+    preferred: f64,
+    /// Root mean square deviation of the paraboloid's H from the true one.
+    paraboloid: f64,
+    /// The same of the preferred of both.
+    better: f64,
 }
 
 fn study(shape: Shape, count: usize, from: f64, noise: f64, batches: usize) -> Study {
     let mut draws = Draws(count as u64);
-    let (mut values, mut squares, mut gaps, mut converged) = (Vec::new(), [0.0; 3], Vec::new(), 0);
+    let (mut values, mut squares, mut gaps) = (Vec::new(), [0.0; 3], Vec::new());
+    let (mut preferred, mut paraboloid, mut better) = (0.0, 0.0, 0.0);
+    let all = (batches * LANES) as f64;
+    let expected = 0.5 * shape.curvatures().iter().sum::<f64>();
     for _ in 0..batches {
         let moments: [_; LANES] =
             std::array::from_fn(|_| Moments::of_points(&shape.points(count, from, noise, &mut draws)));
-        let fits = fit_batch(&moments, Vector3::z());
+        let to_sensor = Some([Lanes::ZERO, Lanes::ZERO, Lanes::ONE]);
+        let batch = MomentBatch::new(&moments);
+        let task = Task { moments: &batch, axes: FitAxes::Surface, to_sensor };
+        let fits = fit_quadrics(InstructionSet::detect(), &task);
+        let rival = fit_paraboloids(InstructionSet::detect(), &task).principal;
         for lane in 0..LANES {
-            let [k1, k2] = [fits.principal.k1, fits.principal.k2].map(|k| k.0[lane]);
+            let mean = 0.5 * (rival.k1.0[lane] + rival.k2.0[lane]);
+            let own = 0.5 * (fits.principal.k1.0[lane] + fits.principal.k2.0[lane]);
+            let prefer = fits.preferred.get(lane);
+            preferred += f64::from(prefer) / all;
+            paraboloid += (mean - expected).powi(2) / all;
+            better += (if prefer { own } else { mean } - expected).powi(2) / all;
             gaps.push(fits.gap.0[lane]);
-            converged += usize::from(fits.converged.get(lane));
-            values.push([k1, k2, 0.5 * (k1 + k2)]);
-            for (square, error) in squares.iter_mut().zip(fits.errors) {
-                *square += error.0[lane].powi(2);
+            if fits.trusted.get(lane) {
+                let [k1, k2] = [fits.principal.k1, fits.principal.k2].map(|k| k.0[lane]);
+                values.push([k1, k2, own]);
+                for (square, error) in squares.iter_mut().zip(fits.errors) {
+                    *square += error.0[lane].powi(2);
+                }
             }
         }
     }
@@ -147,8 +181,10 @@ fn study(shape: Shape, count: usize, from: f64, noise: f64, batches: usize) -> S
     let deviation =
         [0, 1, 2].map(|k| (values.iter().map(|v| (v[k] - mean[k]).powi(2)).sum::<f64>() / n).sqrt());
     gaps.sort_by(f64::total_cmp);
-    let gap = [0.05, 0.5, 0.95].map(|q| gaps[(q * n) as usize]);
-    Study { mean, deviation, error: squares.map(|s| (s / n).sqrt()), gap, converged: converged as f64 / n }
+    let gap = [0.05, 0.5, 0.95].map(|q| gaps[(q * all) as usize]);
+    let error = squares.map(|s| (s / n).sqrt());
+    let [paraboloid, better] = [paraboloid, better].map(f64::sqrt);
+    Study { mean, deviation, error, gap, trusted: n / all, preferred, paraboloid, better }
 }
 
 #[test]
@@ -159,7 +195,7 @@ fn noise_does_not_bias_it_and_its_errors_are_said() {
         let [k1, k2] = shape.curvatures();
         let bias = found.mean[2] / (0.5 * (k1 + k2)) - 1.0;
         assert!(bias.abs() < 3e-3, "{shape:?}: {bias}");
-        assert_eq!(found.converged, 1.0);
+        assert_eq!(found.trusted, 1.0);
         let ratio = found.error[2] / found.deviation[2];
         assert!((0.85..1.2).contains(&ratio), "{shape:?}: {ratio}");
     }
@@ -167,9 +203,9 @@ fn noise_does_not_bias_it_and_its_errors_are_said() {
 
 #[test]
 fn a_plane_has_no_gap() {
-    for count in [30, 100, 300] {
+    for count in [20, 50, 200] {
         let found = study(Shape::Plane, count, -1.0, 0.01, 40);
-        assert!(found.gap[1] < 3.0, "{:?}", found.gap);
+        assert!(found.gap[2] < 4.0, "{:?}", found.gap);
     }
     let exact =
         fit_batch(&[Moments::of_points(&Shape::Plane.points(100, -1.0, 0.0, &mut Draws(2)))], Vector3::z());
@@ -182,22 +218,14 @@ fn a_plane_has_no_gap() {
 fn study_of_trust() {
     let report = |name: String, shape: Shape, count, from, noise| {
         let s = study(shape, count, from, noise, 64);
+        let [k1, k2, h] =
+            [0, 1, 2].map(|k| format!("{:.3}+-{:.3} ({:.3})", s.mean[k], s.deviation[k], s.error[k]));
+        let [low, middle, high] = s.gap;
+        let true_h = 0.5 * shape.curvatures().iter().sum::<f64>();
+        let rms = (s.mean[2] - true_h).hypot(s.deviation[2]);
         println!(
-            "{name:44} gap {:7.2} {:7.2} {:7.2} k1 {:.3}+-{:.3} ({:.3}) k2 {:.3}+-{:.3} ({:.3}) H {:.3}+-{:.3} ({:.3}) true {:?} conv {:.2}",
-            s.gap[0],
-            s.gap[1],
-            s.gap[2],
-            s.mean[0],
-            s.deviation[0],
-            s.error[0],
-            s.mean[1],
-            s.deviation[1],
-            s.error[1],
-            s.mean[2],
-            s.deviation[2],
-            s.error[2],
-            shape.curvatures(),
-            s.converged
+            "{name:36} gap {low:6.2} {middle:6.2} {high:6.2} trusted {:.2} preferred {:.2} k1 {k1} k2 {k2} H {h} rms of H {rms:.4}, paraboloid {:.4}, better {:.4}",
+            s.trusted, s.preferred, s.paraboloid, s.better
         );
     };
     for (name, r) in [("sphere 29.15", 1.4575), ("sphere 14.15", 0.7075)] {
@@ -207,9 +235,9 @@ fn study_of_trust() {
     for count in [12, 15, 20, 30, 60, 235, 1000] {
         report(format!("plane n={count}"), Shape::Plane, count, -1.0, 0.01);
     }
-    for r in [2.0, 10.0] {
-        for from in [-1.0, -0.4, 0.0] {
-            for ratio in [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 40.0] {
+    for r in [0.7, 2.0, 10.0] {
+        for from in [-1.0, 0.0] {
+            for ratio in [4.0, 8.0, 10.0, 12.0, 15.0, 20.0, 40.0, 80.0] {
                 let noise = 0.5 / r / ratio;
                 report(format!("sphere r={r} from={from} s/n={ratio}"), Shape::Sphere(r), 235, from, noise);
                 report(
@@ -252,8 +280,7 @@ fn cost_per_point() {
                     if quadric {
                         std::hint::black_box(fit_quadrics(set, std::hint::black_box(&task)));
                     } else {
-                        let fit = crate::fit::paraboloid::fit_paraboloids;
-                        std::hint::black_box(fit(set, std::hint::black_box(&task)));
+                        std::hint::black_box(fit_paraboloids(set, std::hint::black_box(&task)));
                     }
                 }
                 start.elapsed().as_secs_f64() / 20_000.0 / LANES as f64 * 1e9
