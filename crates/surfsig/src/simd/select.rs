@@ -6,6 +6,7 @@
 
 use super::InstructionSet;
 use super::instruction_set::Kind;
+use crate::cell_index::Lattice;
 
 /// The ball is d^2 <= r^2 (1 + 1e-5), in units of r: float32 offsets cannot decide a tie, and on a
 /// regular grid many points lie exactly on the sphere.
@@ -73,6 +74,18 @@ pub(crate) struct Ball {
     pub scale: f32,
     /// Half the size of a row along y and z, in units of the radius.
     pub half_step: f32,
+}
+
+impl Ball {
+    /// The ball around the query at this offset from its row's middle; `scale` is one over the radius.
+    pub fn around(offset: [f32; 3], scale: f32, lattice: &Lattice) -> Self {
+        let units = f64::from(scale);
+        Self {
+            query: offset.map(|o| f64::from(o) * units),
+            scale,
+            half_step: (lattice.half_step() * units) as f32,
+        }
+    }
 }
 
 /// How far a walk has come: the window, and the rank within it.
