@@ -113,6 +113,11 @@ pub(crate) fn visit_members<V: BallVisitor>(
             break;
         }
     }
+    finish(block, visitor);
+}
+
+/// Shows a visitor what is left in a block.
+pub(crate) fn finish<V: BallVisitor>(block: &mut Block, visitor: &mut V) {
     let len = block.len;
     let padding = len..len.next_multiple_of(PADDING);
     block.x[padding.clone()].fill(0.0);

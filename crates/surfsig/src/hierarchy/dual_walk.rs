@@ -7,29 +7,28 @@
 //! of every ball are the same.
 
 use super::cube::{Cube, Relation};
-use super::forest::{Forest, add, octant, place_on_curve};
-use crate::ball::visit_members;
+use super::forest::{Forest, Source, add, octant, place_on_curve};
+use crate::ball::{BallVisitor, finish, visit_members};
 use crate::block_sums::BlockSums;
 use crate::cell_index::{CellIndex, PARTS_PER_CELL, RowKey};
 use crate::moments::{MOMENTS, Moments, Scalar};
 use crate::simd::InstructionSet;
 use crate::simd::lanes::LANES;
-use crate::simd::select::{Ball, Block, PADDING, Rows, Window};
+use crate::simd::select::{BLOCK, Ball, Block, PIECE, Rows, Window};
+use crate::simd::split::{QueryCube, Rim, split};
 use std::ops::Range;
 
 /// Points of a cube of queries that is not cut any further.
 const QUERY_LEAF: usize = 12;
 
 /// A small cube of queries: what its balls share, and what each must look at.
-pub(crate) struct QueryLeaf {
-    /// Sums of what is inside all balls, about the middle of the region.
+struct QueryLeaf {
+    /// Sums of what is inside all balls, about the cube's centre.
     core: Moments<f64>,
-    /// The middle of the queries' row from there, in units of the radius.
-    middle: [f64; 3],
-    /// The points on the rims, row by row.
-    x: Vec<f32>,
-    y: Vec<f32>,
-    z: Vec<f32>,
+    /// The centre, from the middle of the queries' row, in units of the radius.
+    centre: [f64; 3],
+    /// What may be on the rims, row by row.
+    rim: Rim,
     windows: Vec<Window>,
 }
 
@@ -57,9 +56,11 @@ pub(crate) struct HierarchicalWalk<'a> {
     queries: Vec<u64>,
     frames: Vec<Frame>,
     /// Cubes of points that are near to those cubes of queries that are being walked.
-    near: Vec<u32>,
+    near: Vec<Source>,
     /// Cubes that have yet to be compared.
-    compared: Vec<u32>,
+    compared: Vec<Source>,
+    /// Nodes inside all balls of the present cube of queries.
+    inside: Vec<u32>,
     /// The last leaves: as many as a batch of fits may come back to.
     leaves: [QueryLeaf; LANES],
     last: usize,
@@ -81,12 +82,11 @@ impl<'a> HierarchicalWalk<'a> {
             frames: Vec::new(),
             near: Vec::new(),
             compared: Vec::new(),
+            inside: Vec::new(),
             leaves: std::array::from_fn(|_| QueryLeaf {
                 core: Moments::default(),
-                middle: [0.0; 3],
-                x: Vec::new(),
-                y: Vec::new(),
-                z: Vec::new(),
+                centre: [0.0; 3],
+                rim: Rim::default(),
                 windows: Vec::new(),
             }),
             last: 0,
@@ -111,7 +111,9 @@ impl<'a> HierarchicalWalk<'a> {
         self.queries.sort_unstable();
         let place = self.forest.place(key, cell);
         self.near.clear();
-        self.forest.roots_around(place, &mut self.near);
+        self.inside.clear();
+        self.forest.roots_around(place, &mut self.inside);
+        self.near.extend(self.inside.iter().map(|&node| self.forest.source(node)));
         self.frames.clear();
         self.frames.push(Frame {
             cube: Cube {
@@ -162,54 +164,102 @@ impl<'a> HierarchicalWalk<'a> {
         self.queries[query] as u32 as usize
     }
 
-    /// Compares a cube of queries with what was near to the larger one, cut down to `smallest`.
+    /// Compares a cube of queries with what was near to the larger one. Cubes of points are cut until they are
+    /// leaves, or smaller than `smallest`.
     fn compare(&mut self, frame: &mut Frame, smallest: i16) {
         let start = self.near.len();
-        for place in frame.near.clone() {
-            self.compared.push(self.near[place]);
-            while let Some(number) = self.compared.pop() {
-                let node = &self.forest.nodes[number as usize];
-                match frame.cube.relation(node.cube) {
-                    Relation::Inside => add(&mut frame.core, &self.forest.sums[number as usize]),
-                    Relation::Outside => {}
-                    Relation::Near if node.is_leaf() || node.cube.size < smallest => self.near.push(number),
-                    Relation::Near => self.compared.extend(node.children().rev()),
+        self.compared.clear();
+        self.compared.extend_from_slice(&self.near[frame.near.clone()]);
+        self.inside.clear();
+        loop {
+            self.sift(frame.cube);
+            // Those that must be cut are replaced by their children, so that the order stays.
+            let is_whole = |source: &Source| {
+                source.cube.size < smallest || self.forest.nodes[source.node as usize].is_leaf()
+            };
+            if self.near[start..].iter().all(is_whole) {
+                break;
+            }
+            self.compared.clear();
+            for source in &self.near[start..] {
+                if is_whole(source) {
+                    self.compared.push(*source);
+                } else {
+                    let children = self.forest.nodes[source.node as usize].children();
+                    self.compared.extend(children.map(|node| self.forest.source(node)));
                 }
             }
+            self.near.truncate(start);
+        }
+        for &node in &self.inside {
+            add(&mut frame.core, &self.forest.sums[node as usize]);
         }
         frame.near = start..self.near.len();
     }
 
-    /// Packs what is on the rims of a leaf's balls.
+    /// Appends what was compared with a cube of queries to what is near or inside. Which of the three it is can
+    /// hardly be foreseen, so there is no branch: each is written to both, and the next overwrites it.
+    fn sift(&mut self, cube: Cube) {
+        let (mut near, mut inside) = (self.near.len(), self.inside.len());
+        let count = self.compared.len();
+        let Some(&any) = self.compared.first() else { return };
+        self.near.resize(near + count, any);
+        self.inside.resize(inside + count, 0);
+        for source in &self.compared {
+            let relation = cube.relation(source.cube);
+            self.near[near] = *source;
+            self.inside[inside] = source.node;
+            near += usize::from(relation == Relation::Near);
+            inside += usize::from(relation == Relation::Inside);
+        }
+        self.near.truncate(near);
+        self.inside.truncate(inside);
+    }
+
+    /// Looks at the single points of what is near to a leaf: adds what is inside all balls, and packs the rest.
     fn pack(&mut self, frame: &Frame) -> usize {
         self.last = (self.last + 1) % LANES;
         let leaf = &mut self.leaves[self.last];
         let lattice = &self.index.lattice;
+        let units = f64::from(self.scale);
+        let half = 0.5 * f64::from(frame.cube.size);
+        let from_region = frame.cube.low.map(|low| self.forest.from_middle(f64::from(low) + half));
+        leaf.centre = [0, 1, 2].map(|axis| from_region[axis] - self.middle[axis]);
         leaf.core.sums = frame.core;
-        leaf.middle = self.middle;
+        leaf.core = leaf.core.shifted(from_region.map(|c| -c));
         leaf.windows.clear();
-        leaf.x.clear();
-        leaf.y.clear();
-        leaf.z.clear();
-        let mut row = None;
-        for &number in &self.near[frame.near.clone()] {
-            let node = &self.forest.nodes[number as usize];
-            if row.replace(node.row) != Some(node.row) {
-                let between = lattice.between(self.key, self.forest.key(node.row));
-                let between = between.map(|b| b * f64::from(self.scale));
-                leaf.windows.push(Window { ranks: leaf.x.len()..leaf.x.len(), between });
+        leaf.rim.len = 0;
+        let mut inside = BlockSums::<f64>::new(self.set);
+        self.block.len = 0;
+        let points = self.forest.points();
+        let near = &self.near[frame.near.clone()];
+        let nodes = &self.forest.nodes;
+        for row in near.chunk_by(|a, b| nodes[a.node as usize].row == nodes[b.node as usize].row) {
+            let key = self.forest.key(nodes[row[0].node as usize].row);
+            let between = lattice.between(self.key, key).map(|b| b * units);
+            let cube = QueryCube {
+                scale: self.scale,
+                shift: [0, 1, 2].map(|axis| (between[axis] - leaf.centre[axis]) as f32),
+                half: self.forest.units(half) as f32,
+            };
+            let first = leaf.rim.len;
+            // Neighbouring leaves have neighbouring points.
+            let adjoin = |a: &Source, b: &Source| nodes[a.node as usize].end_point == nodes[b.node as usize].first_point;
+            for run in row.chunk_by(adjoin) {
+                let (from, to) = (nodes[run[0].node as usize].points().start, nodes[run[run.len() - 1].node as usize].points().end);
+                for start in (from..to).step_by(PIECE) {
+                    let ranks = start..to.min(start + PIECE);
+                    split(self.set, points, ranks, cube, &mut self.block, &mut leaf.rim);
+                    while self.block.len >= BLOCK {
+                        inside.visit(&self.block, BLOCK);
+                        self.block.carry_over();
+                    }
+                }
             }
-            let points = node.points();
-            leaf.x.extend_from_slice(&self.forest.x[points.clone()]);
-            leaf.y.extend_from_slice(&self.forest.y[points.clone()]);
-            leaf.z.extend_from_slice(&self.forest.z[points]);
-            if let Some(window) = leaf.windows.last_mut() {
-                window.ranks.end = leaf.x.len();
-            }
+            leaf.windows.push(Window { ranks: first..leaf.rim.len, between });
         }
-        for column in [&mut leaf.x, &mut leaf.y, &mut leaf.z] {
-            column.resize(column.len() + PADDING, 0.0);
-        }
+        finish(&mut self.block, &mut inside);
+        leaf.core += inside.total;
         self.last
     }
 
@@ -218,8 +268,8 @@ impl<'a> HierarchicalWalk<'a> {
         let leaf = &self.leaves[slot];
         let ball = Ball::around(offset, self.scale, &self.index.lattice);
         let mut rim = BlockSums::<S>::new(self.set);
-        let rows = Rows { x: &leaf.x, y: &leaf.y, z: &leaf.z };
+        let rows = Rows { x: &leaf.rim.x, y: &leaf.rim.y, z: &leaf.rim.z };
         visit_members(self.set, rows, &leaf.windows, ball, &mut self.block, &mut rim);
-        leaf.core.shifted([0, 1, 2].map(|axis| -leaf.middle[axis] - ball.query[axis])) + rim.total
+        leaf.core.shifted([0, 1, 2].map(|axis| leaf.centre[axis] - ball.query[axis])) + rim.total
     }
 }

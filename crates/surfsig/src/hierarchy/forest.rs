@@ -6,6 +6,7 @@
 use super::cube::Cube;
 use crate::cell_index::{CELLS_PER_ROW, CellIndex, PARTS_PER_CELL, Row, RowKey};
 use crate::moments::MOMENTS;
+use crate::simd::select::{PADDING, Rows};
 use std::ops::Range;
 
 /// Cells along a region's edge; rows hold a whole number of them. Larger regions build fewer trees
@@ -53,6 +54,13 @@ struct ForestRow {
     row: Option<Row>,
 }
 
+/// A cube of points, and where it stands in the forest.
+#[derive(Clone, Copy)]
+pub(super) struct Source {
+    pub cube: Cube,
+    pub node: u32,
+}
+
 /// What is known of a cell.
 #[derive(Clone, Copy)]
 enum Tree {
@@ -72,10 +80,12 @@ pub(super) struct Forest<'a> {
     /// Of each node, about the middle of the region, in units of the radius: sums of nodes can so be
     /// added up as they are.
     pub sums: Vec<[f64; MOMENTS]>,
-    /// Offsets from the middle of each point's row, as the index has them, in the order of the trees.
-    pub x: Vec<f32>,
-    pub y: Vec<f32>,
-    pub z: Vec<f32>,
+    /// Offsets from the middle of each point's row, as the index has them, in the order of the trees, padded
+    /// so that a vector may overrun the end.
+    x: Vec<f32>,
+    y: Vec<f32>,
+    z: Vec<f32>,
+    points: usize,
     /// Of the points of the tree that is being built: place along the curve, and number in the row.
     curve: Vec<u64>,
 }
@@ -93,6 +103,7 @@ impl<'a> Forest<'a> {
             x: Vec::new(),
             y: Vec::new(),
             z: Vec::new(),
+            points: 0,
             curve: Vec::new(),
         }
     }
@@ -104,9 +115,7 @@ impl<'a> Forest<'a> {
         self.trees.resize((WIDTH * WIDTH * WIDTH) as usize, Tree::NotBuilt);
         self.nodes.clear();
         self.sums.clear();
-        self.x.clear();
-        self.y.clear();
-        self.z.clear();
+        self.points = 0;
         self.rows.clear();
         let [x, y, z] = self.corner;
         for z in z..z + WIDTH {
@@ -125,6 +134,11 @@ impl<'a> Forest<'a> {
     pub fn place(&self, key: RowKey, cell: i32) -> [i64; 3] {
         let [x, y, z] = self.corner;
         [key.x * CELLS_PER_ROW + i64::from(cell) - x, key.y - y, key.z - z]
+    }
+
+    /// All points, by the numbers that nodes give.
+    pub fn points(&self) -> Rows<'_> {
+        Rows { x: &self.x, y: &self.y, z: &self.z }
     }
 
     pub fn key(&self, row: u16) -> RowKey {
@@ -151,6 +165,21 @@ impl<'a> Forest<'a> {
                 }
             }
         }
+    }
+
+    /// A length in parts, in units of the radius.
+    pub fn units(&self, parts: f64) -> f64 {
+        2.0 * self.index.lattice.half_step() * self.scale / f64::from(PARTS_PER_CELL) * parts
+    }
+
+    /// A place along an axis, in parts from the corner of the margin, from the middle of the region, in units
+    /// of the radius.
+    pub fn from_middle(&self, parts: f64) -> f64 {
+        self.units(parts - (WIDTH * i64::from(PARTS_PER_CELL) / 2) as f64)
+    }
+
+    pub fn source(&self, node: u32) -> Source {
+        Source { cube: self.nodes[node as usize].cube, node }
     }
 
     /// The root of the tree of the cell at this place, if there are points in it.
@@ -185,13 +214,13 @@ impl<'a> Forest<'a> {
             u64::from(place_on_curve(lattice.part(offset(rank)))) << 32 | (rank - start) as u64
         }));
         self.curve.sort_unstable();
-        let first_point = self.x.len() as u32;
-        for &point in &self.curve {
-            let [px, py, pz] = offset(start + (point as u32) as usize);
-            self.x.push(px);
-            self.y.push(py);
-            self.z.push(pz);
+        let first_point = self.points as u32;
+        for (column, values) in [(&mut self.x, x), (&mut self.y, y), (&mut self.z, z)] {
+            column.truncate(self.points);
+            column.extend(self.curve.iter().map(|&point| values[start + (point as u32) as usize]));
+            column.extend([0.0; PADDING]);
         }
+        self.points += self.curve.len();
         let root = self.nodes.len();
         let low = place.map(|cell| (cell * i64::from(PARTS_PER_CELL)) as i16);
         self.nodes.push(Node {
@@ -200,7 +229,7 @@ impl<'a> Forest<'a> {
             row: number as u16,
             first_child: 0,
             first_point,
-            end_point: self.x.len() as u32,
+            end_point: self.points as u32,
         });
         // Children are appended, and so are cut in their turn.
         let mut node = root;

@@ -193,29 +193,30 @@ fn select_baseline<const RANKS: bool>(
     }
 }
 
+/// For each mask of eight lanes, the lanes that are set, packed to the left.
+#[cfg(target_arch = "x86_64")]
+pub(super) static PACK_LEFT: [[i32; 8]; 256] = {
+    let mut table = [[0; 8]; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut lane, mut packed) = (0, 0_usize);
+        while lane < 8 {
+            if mask >> lane & 1 == 1 {
+                table[mask][packed] = lane;
+                packed += 1;
+            }
+            lane += 1;
+        }
+        mask += 1;
+    }
+    table
+};
+
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{BALL_LIMIT, Ball, Block, Place, Placement, Rows, Window, gather_by};
+    use super::{BALL_LIMIT, Ball, Block, PACK_LEFT, Place, Placement, Rows, Window, gather_by};
     use std::arch::x86_64::*;
     use std::ops::Range;
-
-    /// For each mask of eight lanes, the lanes that are set, packed to the left.
-    static PACK_LEFT: [[i32; 8]; 256] = {
-        let mut table = [[0; 8]; 256];
-        let mut mask = 0;
-        while mask < 256 {
-            let (mut lane, mut packed) = (0, 0_usize);
-            while lane < 8 {
-                if mask >> lane & 1 == 1 {
-                    table[mask][packed] = lane;
-                    packed += 1;
-                }
-                lane += 1;
-            }
-            mask += 1;
-        }
-        table
-    };
 
     #[target_feature(enable = "avx2,fma,popcnt")]
     pub(super) fn gather_avx2<const RANKS: bool>(
