@@ -37,6 +37,7 @@ mod error;
 mod extract;
 mod fit;
 mod frame;
+mod hierarchy;
 mod members;
 mod moments;
 mod point_cloud;
