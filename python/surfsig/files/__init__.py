@@ -77,6 +77,12 @@ def read(
     UserWarning
         If the last line of a text file is cut off (it is dropped) or may be, or values are left out that are
         no numbers.
+
+    Notes
+    -----
+    Memory: binary PLY and PCD, NPZ, and NPY (n, 3) need the cloud itself and a few MB (a PLY file whose lists
+    differ in length also what follows the first that does); other files up to twice the cloud and more. A box
+    or a unit makes a copy.
     """
     path = Path(path)
     corners = None if box is None else box_array(box)
@@ -158,9 +164,9 @@ def write(
         rounded to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields.
     columns
         (n,) or (n, k) numbers by name. ``normals`` (n, 3) are written as nx, ny, nz and ``colors`` (n, 3 or
-        4) as red, green, blue (and alpha); PCD packs colours of uint8 into ``rgb`` or ``rgba``. Any other (n, k)
-        column stays one in PCD, NPZ and Parquet, and becomes NAME_0, NAME_1, ... in PLY, LAS and LAZ. A field
-        of the cloud with the same name is kept as ``input_NAME``.
+        4) as red, green, blue (and alpha); PCD packs colours of uint8 into ``rgb`` or ``rgba``. Any other
+        (n, k) column stays one in PCD, NPZ and Parquet, and becomes NAME_0, NAME_1, ... in PLY, LAS and LAZ.
+        A field of the cloud with the same name is kept as ``input_NAME``.
     chunks
         One more column, (n, width), given block by block so that it need not fit in memory.
     notes

@@ -15,6 +15,8 @@ from surfsig.point_cloud import PointCloud
 # this share of the cloud's extent (many programs print UTM coordinates in full and declare them "float").
 LOSS_ALLOWED = 1e-6
 
+# What a `PointCloud` keeps as it is.
+_COORDINATES = (np.dtype("<f4"), np.dtype(">f4"), np.dtype("<f8"), np.dtype(">f8"))
 _COLOURS = {
     prefix + letter: name
     for name in ("red", "green", "blue", "alpha")
@@ -85,9 +87,12 @@ def cloud_from_columns(
             raise FileFormatError(f"{source}: column '{axis}' holds {columns[axis].dtype}, not real numbers")
     # Joining with float32 gives float32 to small types, and float64 to all that would lose digits.
     joint = np.result_type(np.float32, *(columns[axis].dtype for axis in axes))
-    offsets = np.empty((len(first), 3), np.float32 if joint == np.float32 else np.float64)
-    for i, axis in enumerate(axes):
-        offsets[:, i] = columns[axis]
+    kept = np.float32 if joint == np.float32 else np.float64
+    offsets = _side_by_side([columns[axis] for axis in axes], np.dtype(kept))
+    if offsets is None:
+        offsets = np.empty((len(first), 3), kept)
+        for i, axis in enumerate(axes):
+            offsets[:, i] = columns[axis]
     if declared_float32:
         offsets = _narrowed(offsets)
     others = {name: _native(values) for name, values in columns.items() if name not in axes}
@@ -226,18 +231,34 @@ def aligned_blocks(chunks: Chunks | None, count: int) -> Iterable[tuple[slice, N
 
 
 def columns_of(rows: NDArray[Any]) -> dict[str, NDArray[Any]]:
-    """Take a structured array apart into contiguous columns of the machine's byte order.
+    """Take a structured array apart, as `filled_columns` does."""
+    return filled_columns(rows.dtype, len(rows), blocks_of(rows, 4096))
 
-    Block by block, because a wide row (signatures: a kilobyte) would otherwise be fetched once per column.
+
+def filled_columns(
+    dtype: np.dtype[Any], count: int, blocks: Iterable[NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """Take structured blocks apart into columns of the machine's byte order.
+
+    By blocks, because a wide row (signatures: a kilobyte) would otherwise be fetched once per column. Columns
+    x, y and z of one floating type lie side by side in memory, where `cloud_from_columns` takes them as the
+    cloud's coordinates without a copy; all others are contiguous.
+
+    Parameters
+    ----------
+    dtype
+        Structured: what the blocks have.
+    count
+        Rows of all blocks together.
+    blocks
+        In their order.
     """
-    columns: dict[str, NDArray[Any]] = {}
-    for name in rows.dtype.names or ():
-        kind = rows.dtype[name]
-        columns[name] = np.empty((len(rows), *kind.shape), kind.base.newbyteorder("="))
-    for start in range(0, len(rows), 4096):
-        block = rows[start : start + 4096]
+    columns = _empty_columns(dtype, count)
+    start = 0
+    for block in blocks:
         for name, column in columns.items():
-            column[start : start + 4096] = block[name]
+            column[start : start + len(block)] = block[name]
+        start += len(block)
     return columns
 
 
@@ -253,6 +274,32 @@ def with_colours(fields: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
         named.get(name, name): values.astype(np.uint8, copy=False) if name in named else values
         for name, values in fields.items()
     }
+
+
+def _empty_columns(dtype: np.dtype[Any], count: int) -> dict[str, NDArray[Any]]:
+    names = dtype.names or ()
+    kinds = {name: dtype[name].base.newbyteorder("=") for name in names}
+    axes = [next((name for name in names if name.lower() == axis), "") for axis in "xyz"]
+    if "" in axes or any(dtype[n] not in _COORDINATES or kinds[n] != kinds[axes[0]] for n in axes):
+        axes = []
+    points = np.empty((count if axes else 0, 3), kinds[axes[0]] if axes else None)
+    return {
+        name: points[:, axes.index(name)]
+        if name in axes
+        else np.empty((count, *dtype[name].shape), kinds[name])
+        for name in names
+    }
+
+
+def _side_by_side(columns: list[NDArray[Any]], dtype: np.dtype[Any]) -> NDArray[Any] | None:
+    """Give three columns as the one (n, 3) array that they are the columns of; None if they are not."""
+    x = columns[0]
+    step = dtype.itemsize
+    if not x.size or any(values.dtype != dtype or values.strides != (3 * step,) for values in columns):
+        return None
+    if any(values.ctypes.data != x.ctypes.data + i * step for i, values in enumerate(columns)):
+        return None
+    return np.lib.stride_tricks.as_strided(x, (len(x), 3), (3 * step, step))
 
 
 def _narrowed(offsets: NDArray[Any]) -> NDArray[Any]:
