@@ -36,7 +36,7 @@ BLOCK = re.compile(r"```python\n(?P<code>.*?)```\n(?:\n```text\n(?P<output>.*?)`
 VIEW = plot.view_axes(-62.0, -48.0) * np.array([[-1.0], [-1.0], [1.0]])
 """From the scanner's side, a little from the front; the part's heights run along negative z."""
 
-COLOURS = 96
+COLOURS = 160
 """Of a picture: few enough for 150 kB."""
 
 Values = dict[str, Any]
@@ -90,7 +90,7 @@ def read(v: Values) -> Figure:
 
 
 def clean(v: Values) -> Figure:
-    """What stays, and what strays: it is not near any point that stays in the order of the scan."""
+    """What stays grey, what strays red."""
     figure, (ax,) = panels()
     scan, kept = v["scan"], v["kept"]
     stays = np.isin(_rows(scan.points), _rows(kept.points))
@@ -123,9 +123,11 @@ def neighbors(v: Values) -> Figure:
 
 
 def robust(v: Values) -> Figure:
-    """The bad scan, fitted both ways; without the outliers themselves, which would hide it."""
+    """The dome of the bad scan, fitted both ways; without the outliers themselves, which would hide it."""
     figure, axes = panels(2)
-    good = v["bad"].fields["outlier"] == 0
+    middle = v["bad"].points[v["dome"]].mean(axis=0)
+    near = np.linalg.norm(v["bad"].points[:, :2] - middle[:2], axis=1) < 0.035
+    good = near & (v["bad"].fields["outlier"] == 0)
     for ax, name in zip(axes, ("plain", "robust"), strict=True):
         found = v[name]
         draw(
@@ -134,7 +136,7 @@ def robust(v: Values) -> Figure:
             found.mean_curvature[good],
             (-150, 150),
             normals=found.normals[good],
-            size=0.15,
+            size=1.0,
         )
         ax.set_title(name)
     return figure
@@ -218,9 +220,9 @@ def _rows(points: np.ndarray) -> np.ndarray:
 def save(figure: Figure, path: Path) -> None:
     """Write a small PNG."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, dpi=130)
+    figure.savefig(buffer, dpi=120)
     plt.close(figure)
-    Image.open(buffer).convert("RGB").quantize(COLOURS).save(path, optimize=True)
+    Image.open(buffer).convert("RGB").quantize(COLOURS, Image.Quantize.FASTOCTREE).save(path, optimize=True)
 
 
 def main(folder: Path) -> None:
