@@ -82,7 +82,7 @@ def panels(count: int = 1) -> tuple[Figure, list[Axes]]:
 
 
 def read(v: Values) -> Figure:
-    """Heights."""
+    """Draw heights."""
     figure, (ax,) = panels()
     scan = v["scan"]
     draw(ax, scan.points, -1000 * scan.points[:, 2], (-15, 20), colormap="viridis", label="height [mm]")
@@ -90,7 +90,7 @@ def read(v: Values) -> Figure:
 
 
 def clean(v: Values) -> Figure:
-    """What stays grey, what strays red."""
+    """Draw what stays grey, what strays red."""
     figure, (ax,) = panels()
     scan, kept = v["scan"], v["kept"]
     stays = np.isin(_rows(scan.points), _rows(kept.points))
@@ -99,12 +99,12 @@ def clean(v: Values) -> Figure:
 
 
 def curvature(v: Values) -> Figure:
-    """Mean curvature."""
+    """Draw mean curvature."""
     return _of_extraction(v, v["s"].mean_curvature, (-150, 150), label="H [1/m]")
 
 
 def errors(v: Values) -> Figure:
-    """Flat, curved, or no paraboloid."""
+    """Draw what is flat grey and what is curved red, where a paraboloid fits."""
     s = v["s"]
     figure, (ax,) = panels()
     draw(
@@ -118,32 +118,30 @@ def errors(v: Values) -> Figure:
 
 
 def neighbors(v: Values) -> Figure:
-    """Each place's own radius."""
+    """Draw each place's own radius."""
     return _of_extraction(v, 1000 * v["nearest"].radius, (2.5, 4.5), colormap="viridis", label="radius [mm]")
 
 
 def robust(v: Values) -> Figure:
-    """The dome of the bad scan, fitted both ways; without the outliers themselves, which would hide it."""
+    """Draw the dome's error, fitted both ways; without the outliers themselves, which would hide it."""
     figure, axes = panels(2)
-    middle = v["bad"].points[v["dome"]].mean(axis=0)
-    near = np.linalg.norm(v["bad"].points[:, :2] - middle[:2], axis=1) < 0.035
-    good = near & (v["bad"].fields["outlier"] == 0)
+    good = v["dome"] & (v["bad"].fields["outlier"] == 0)
     for ax, name in zip(axes, ("plain", "robust"), strict=True):
         found = v[name]
         draw(
             ax,
             found.points[good],
-            found.mean_curvature[good],
-            (-150, 150),
+            found.mean_curvature[good] - 1 / 0.03,
+            (-15, 15),
             normals=found.normals[good],
-            size=1.0,
+            size=2.0,
         )
-        ax.set_title(name)
+        ax.set_title(f"{name}: H - 1 / 30 mm, to 15 per metre")
     return figure
 
 
 def similarity(v: Values) -> Figure:
-    """Zeta, and the place that all others are compared with."""
+    """Draw zeta, and the place that all others are compared with."""
     figure = _of_extraction(v, v["zeta"], (0, 1), colormap="viridis", label="zeta, eq. (12)")
     points = v["s"].points
     place = (points[v["top"]] - points.mean(axis=0)) @ VIEW.T
@@ -152,14 +150,14 @@ def similarity(v: Values) -> Figure:
 
 
 def pandas(v: Values) -> Figure:
-    """The selected places in colour."""
+    """Draw the selected places in colour."""
     k1 = np.full(len(v["s"]), np.nan)
     k1[v["tight"].index] = v["tight"].k1
     return _of_extraction(v, k1, (-300, 300), label="k1 [1/m]")
 
 
 def write(v: Values) -> Figure:
-    """What an E57 file brings back."""
+    """Draw what an E57 file brings back."""
     figure, (ax,) = panels()
     back = v["e57"]
     normals = np.column_stack([back.fields[name] for name in ("nx", "ny", "nz")])
@@ -169,7 +167,7 @@ def write(v: Values) -> Figure:
 
 
 def cpp(v: Values) -> Figure:
-    """The three patches of examples/cpp, each about its own middle."""
+    """Draw the three patches of examples/cpp, each about its own middle."""
     figure, axes = panels(3)
     found = v["found"]
     for i, (ax, name) in enumerate(zip(axes, ("sphere", "sphere", "saddle"), strict=True)):
@@ -189,7 +187,7 @@ def cpp(v: Values) -> Figure:
 
 
 def paper(v: Values) -> Figure:
-    """Two matrices of zeta."""
+    """Draw two matrices of zeta."""
     figure, axes = panels(2)
     titles = ("the paper's way, stated poses", "own axes, random poses")
     for ax, zeta, title in zip(axes, (v["printed"], v["ours"]), titles, strict=True):

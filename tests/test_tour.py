@@ -18,15 +18,20 @@ NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")
 KIBIBYTES_150 = 150 * 1024
 
 
-def test_the_code_prints_what_the_tour_quotes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_code_prints_what_the_tour_quotes_and_is_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     values: dict[str, Any] = {}
-    for code, quoted in SCRIPT["code_blocks"]():
+    for (code, quoted), draw in zip(SCRIPT["code_blocks"](), SCRIPT["STEPS"], strict=True):
         printed = SCRIPT["run"](code, values)
         assert NUMBER.sub("#", printed) == NUMBER.sub("#", quoted)
         ours, theirs = ([float(number) for number in NUMBER.findall(text)] for text in (printed, quoted))
         # The last digit that is printed, or two percent.
         assert ours == pytest.approx(theirs, rel=0.02, abs=0.11)
+        picture = tmp_path / "picture.png"
+        SCRIPT["save"](draw(values), picture)
+        assert 5_000 < picture.stat().st_size < KIBIBYTES_150
 
 
 def test_every_step_has_code_output_and_picture() -> None:
