@@ -1,6 +1,7 @@
 """The reference has words for every public name: what it takes, gives and refuses."""
 
 import ast
+import dataclasses
 import inspect
 import itertools
 import textwrap
@@ -80,7 +81,7 @@ def test_a_function_says_what_it_takes_gives_and_refuses(function: Function) -> 
 def test_a_class_says_what_each_of_its_values_is(kind: type) -> None:
     found = sections(kind)
     told = documented(found.get("Attributes", []) + found.get("Parameters", []))
-    if inspect.isfunction(kind.__init__):
+    if dataclasses.is_dataclass(kind):
         told |= words_below(kind)
     assert found[""]
     for name in [*getattr(kind, "__dataclass_fields__", {}), *vars(kind)]:
