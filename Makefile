@@ -9,7 +9,7 @@ PREFIX ?= /usr/local
 # What the compiled module is made from; a change of any rebuilds it.
 SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help demo test lint format bench docs wheel check-wheel header install-c clean build
+.PHONY: help demo test lint format bench docs tour wheel check-wheel header install-c clean build
 .DEFAULT_GOAL := help
 
 help: ## Say what there is to make
@@ -40,9 +40,13 @@ format: $(VENV)/.tools ## Format all code
 bench: build ## Time surfsig and its peers in one run, and write BENCHMARKS.md
 	$(BIN)/python benchmarks/run.py --write
 
-docs: build ## Build the API reference: target/doc (Rust) and build/docs (Python)
-	cargo doc --workspace --no-deps
-	$(BIN)/python -m pdoc --docformat numpy --output-directory build/docs surfsig
+docs: build ## Build the API reference: target/doc (Rust) and build/docs (Python, the C headers)
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+	$(BIN)/python -W error -m pdoc --docformat numpy --output-directory build/docs surfsig
+	cp crates/surfsig-c/include/surfsig.h crates/surfsig-c/include/surfsig.hpp build/docs
+
+tour: build ## Run the code of docs/tour.md, and draw its pictures
+	$(BIN)/python examples/tour.py
 
 wheel: $(VENV)/.tools ## Build the wheel, for all Pythons from 3.10 on, into dist/
 	rm -rf dist

@@ -116,6 +116,15 @@ def read(
 def format_name(path: str | os.PathLike[str]) -> str:
     """Say what format a file has by its content ("PLY", "text", ...).
 
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    The format's name.
+
     Raises
     ------
     OSError, FileFormatError
@@ -129,6 +138,11 @@ def format_name(path: str | os.PathLike[str]) -> str:
 
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Make sure, before a long computation, that `write` will be able to write to `path`.
+
+    Parameters
+    ----------
+    path
+        The file to be written.
 
     Raises
     ------
