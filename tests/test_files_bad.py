@@ -324,3 +324,14 @@ def test_a_header_with_no_points_is_an_empty_cloud(tmp_path: Path, content: byte
         assert isinstance(again, PointCloud)
         assert list(again.fields) == ["k1"]
         assert len(again) == 0
+
+
+def test_messages_stay_one_line_whatever_a_library_or_a_file_says(tmp_path: Path) -> None:
+    # Arrow ends its own message in a line feed; escape codes in a name would reach the terminal.
+    content = bytearray(parquet())
+    content[4:30] = b"\x0f" * 26
+    path = tmp_path / "a\x1b[31m\n.parquet"
+    path.write_bytes(content)
+    with pytest.raises(FileFormatError) as error:
+        read(path)
+    assert str(error.value).isprintable()
