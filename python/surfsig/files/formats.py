@@ -53,7 +53,8 @@ class Format:
     recognise
         Tells from the first bytes whether a file has this format.
     read
-        Reads from an open file; None if the format is only recognised, to be named in a message.
+        Reads from an open file; None if the format is only recognised, to be named in a message. A name
+        (MODULE:FUNCTION) where the library behind it takes a while to import.
     write
         Writes to an open file; None if the format is not written.
     check
@@ -67,8 +68,8 @@ class Format:
     name: str
     extensions: tuple[str, ...]
     recognise: Callable[[bytes], bool]
-    read: Reader | None = None
-    write: Writer | None = None
+    read: Reader | str | None = None
+    write: Writer | str | None = None
     check: Callable[[], None] = lambda: None
     reserved: tuple[str, ...] = ("x", "y", "z")
     takes: tuple[str, ...] = ()
@@ -90,19 +91,16 @@ def _is_text(head: bytes) -> bool:
     return 0 not in head and controls * 50 <= len(head)
 
 
-def _imported(module: str, function: str) -> Callable[..., Any]:
-    """Give a function of a module here that is imported when it is called: its library takes a while."""
-
-    def call(*arguments: Any, **options: Any) -> Any:
-        found = importlib.import_module(f"surfsig.files.{module}")
-        return getattr(found, function)(*arguments, **options)
-
-    return call
+def _function(of: Callable[..., Any] | str) -> Any:
+    """Give a function, imported now where it is named: MODULE:FUNCTION of this package."""
+    if not isinstance(of, str):
+        return of
+    module, _, name = of.partition(":")
+    return getattr(importlib.import_module(f"surfsig.files.{module}"), name)
 
 
 # Bit 7 of the point format's number says that the points are compressed.
 _LAZ = re.compile(rb"LASF.{100}[\x80-\xff]", re.DOTALL)
-_read_las = _imported("las", "read")
 
 _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
 
@@ -122,10 +120,8 @@ FORMATS = (
     Format(
         "Parquet", (".parquet",), _begins(parquet.MAGIC), parquet.read, parquet.write, parquet.check_available
     ),
-    Format("LAZ", (".laz",), _matches(_LAZ), _read_las, _imported("las_write", "write_laz"), takes=("box",)),
-    Format(
-        "LAS", (".las",), _begins(b"LASF"), _read_las, _imported("las_write", "write_las"), takes=("box",)
-    ),
+    Format("LAZ", (".laz",), _matches(_LAZ), "las:read", "las_write:write_laz", takes=("box",)),
+    Format("LAS", (".las",), _begins(b"LASF"), "las:read", "las_write:write_las", takes=("box",)),
     Format("E57", (".e57",), _begins(e57.MAGIC), e57.read, e57_writer.write, takes=("scan",)),
     Format("PNG image", (".png",), _begins(b"\x89PNG")),
     Format("JPEG image", (".jpg", ".jpeg"), _begins(b"\xff\xd8\xff")),
@@ -157,7 +153,7 @@ def of_content(path: Path, head: bytes) -> tuple[Format, Reader]:
                 raise FileFormatError(
                     f"{path}: holds {kind.name} data, which cannot be read (only {readable} can)"
                 )
-            return kind, kind.read
+            return kind, _function(kind.read)
     if by_name is not None:
         raise FileFormatError(
             f"{path}: is not a {by_name.name} file, nor any other that can be read ({readable})"
@@ -176,7 +172,7 @@ def of_output(path: Path) -> tuple[Format, Writer]:
     for kind in FORMATS:
         if kind.write is not None and path.suffix.lower() in kind.extensions:
             kind.check()
-            return kind, kind.write
+            return kind, _function(kind.write)
     known = ", ".join(
         extension for kind in FORMATS if kind.write is not None for extension in kind.extensions
     )
