@@ -335,3 +335,12 @@ def test_messages_stay_one_line_whatever_a_library_or_a_file_says(tmp_path: Path
     with pytest.raises(FileFormatError) as error:
         read(path)
     assert str(error.value).isprintable()
+
+
+def test_parquet_column_name_that_is_no_utf8(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "a.parquet"
+    write(path, PointCloud(POINTS), {"label": np.arange(200)})
+    path.write_bytes(path.read_bytes().replace(b"label", b"\x80abel"))
+    with pytest.raises(FileFormatError, match="a column's name is not in UTF-8"):
+        read(path)
