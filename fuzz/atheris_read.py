@@ -2,8 +2,8 @@
 
     python fuzz/atheris_read.py PLY -max_total_time=60
 
-What follows the format (PLY, PCD, text, NPY, NPZ, ...) goes to libFuzzer; new inputs are collected in a folder
-given there. It sees the readers that are written in Python; those in other libraries are left to mutate.py.
+What follows the format (PLY, PCD, text, NPY, NPZ, ...) goes to libFuzzer; inputs that reach new lines are
+collected in fuzz/found/inputs. It sees the readers that are written in Python; mutate.py has the others too.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ INPUTS = Path(__file__).parent / "found" / "inputs"
 
 
 def read_one(content: bytes, path: Path, whole: Seed) -> None:
-    """Read a file; any other error than those of `surfsig.read` goes on to libFuzzer, which keeps the file."""
+    """Read a file; any other error than those of `surfsig.read` goes to libFuzzer, which keeps the file."""
     path.write_bytes(content)
     with contextlib.suppress(surfsig.SurfsigError):
         surfsig.read(path, **whole.options)
@@ -33,7 +33,9 @@ def read_one(content: bytes, path: Path, whole: Seed) -> None:
 
 def main() -> None:
     """Hand the format's whole files to libFuzzer and let it run."""
-    corpus = [whole for whole in seeds() if whole.format.lower() == sys.argv[1].lower()] if sys.argv[1:] else []
+    corpus = (
+        [whole for whole in seeds() if whole.format.lower() == sys.argv[1].lower()] if sys.argv[1:] else []
+    )
     if not corpus:
         sys.exit("name a format: " + ", ".join(sorted({whole.format for whole in seeds()})))
     inputs = INPUTS / corpus[0].format

@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import struct
 import tempfile
+import warnings
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -216,7 +217,9 @@ def seeds(also: Path | None = None) -> list[Seed]:
             path = Path(folder) / name
             path.write_bytes(content)
             try:
-                surfsig.read(path, **options)
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    surfsig.read(path, **options)
             except surfsig.SurfsigError:
                 # A format made by hand that this version does not read yet.
                 if must:
