@@ -12,7 +12,7 @@ from typing import Any, BinaryIO, Protocol
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError, InvalidInputError
-from surfsig.files import e57, e57_writer, numpy_files, parquet, pcd, ply, text
+from surfsig.files import e57, e57_writer, numpy_files, parquet, pcd, pcd_write, ply, text
 from surfsig.files.columns import Chunks
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
@@ -107,7 +107,7 @@ _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
 # The order matters: text comes last, because every PCD header and every HTML page is text as well.
 FORMATS = (
     Format("PLY", (".ply",), _matches(ply.MAGIC), ply.read, ply.write),
-    Format("PCD", (".pcd",), _matches(pcd.MAGIC), pcd.read),
+    Format("PCD", (".pcd",), _matches(pcd.MAGIC), pcd.read, pcd_write.write, reserved=pcd_write.RESERVED),
     Format("NPY", (".npy",), _begins(numpy_files.NPY_MAGIC), numpy_files.read_npy),
     Format(
         "NPZ",
