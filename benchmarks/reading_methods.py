@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from timing import seconds_of
 
-DISTRIBUTIONS = ("open3d-cpu", "laspy", "lazrs", "numpy", "pandas", "pyarrow")
+DISTRIBUTIONS = ("open3d-cpu", "laspy", "lazrs", "pandas")
 
 
 def surfsig(path: Path) -> Any:
