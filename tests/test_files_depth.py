@@ -60,10 +60,15 @@ def test_values(tmp_path: Path, shape: tuple[int, int], scale: float | None) -> 
     assert told == sorted(told)
 
 
-def test_the_intrinsics_are_asked_for(tmp_path: Path) -> None:
-    (tmp_path / "a.png").write_bytes(png(depths(3, 4)))
-    with pytest.raises(ValueError, match=r"a\.png: .*the camera's intrinsics \(--intrinsics fx,fy,cx,cy\)"):
-        read(tmp_path / "a.png")
+def test_the_intrinsics_are_asked_for_and_the_path_named_once(tmp_path: Path) -> None:
+    path = tmp_path / "a.png"
+    path.write_bytes(png(depths(3, 4)))
+    with pytest.raises(FileFormatError) as error:
+        read(path)
+    message = "a depth image needs the camera's intrinsics (--intrinsics fx,fy,cx,cy)"
+    assert str(error.value) == f"{path}: {message}"
+    with pytest.raises(InvalidInputError, match="a depth image needs the camera's intrinsics"):
+        read(path, depth_scale=5000.0)
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def read(
     """
     size = os.fstat(file.fileno()).st_size
     _check_image(file, source)
-    fx, fy, cx, cy = _checked(intrinsics, depth_scale, source)
+    fx, fy, cx, cy = _checked(intrinsics, depth_scale)
     check_available()
     file.seek(0)
     depths = _decoded(file, source)
@@ -137,12 +137,10 @@ def _inflated_bytes(inflater: zlib._Decompress, data: bytes, needed: int, source
 
 
 def _checked(
-    intrinsics: ArrayLike | None, depth_scale: float, source: str
+    intrinsics: ArrayLike | None, depth_scale: float
 ) -> tuple[np.float64, np.float64, np.float64, np.float64]:
     if intrinsics is None:
-        raise InvalidInputError(
-            f"{source}: a depth image needs the camera's intrinsics (--intrinsics fx,fy,cx,cy)"
-        )
+        raise InvalidInputError("a depth image needs the camera's intrinsics (--intrinsics fx,fy,cx,cy)")
     try:
         numbers = np.array(intrinsics, dtype=np.float64)
     except (TypeError, ValueError):

@@ -21,6 +21,8 @@ _VERTEX = rb"[ \t]*v(?:[ \t]+[-+.\deE]+){3,}[ \t]*"
 # Whole lines of OBJ's words, of which one is a vertex.
 MAGIC = re.compile(rb"(?:\xef\xbb\xbf)?(?:" + _LINE + rb"[\r\n])*?" + _VERTEX + rb"(?:[\r\n]|$)")
 
+# Python's own limit on digits would raise an error of another kind.
+_NUMBER = re.compile(r"[-+]?\d{1,18}", re.ASCII)
 _COLOURS = ("red", "green", "blue")
 
 
@@ -150,8 +152,7 @@ class _Parts:
 
     def _index(self, text: str, count: int, line: int) -> int:
         """Turn a number from 1, or one that counts back from the last one so far, into one from 0."""
-        # Python's own limit on digits would raise an error of another kind.
-        if re.fullmatch(r"[-+]?\d{1,18}", text, re.ASCII) is None:
+        if _NUMBER.fullmatch(text) is None:
             raise FileFormatError(f"{self._source}: line {line}: {text[:40]!r} is no number of a vertex")
         number = int(text)
         index = number - 1 if number > 0 else count + number
