@@ -2,6 +2,7 @@
 
 import contextlib
 import struct
+import sys
 import tracemalloc
 import zlib
 from pathlib import Path
@@ -69,6 +70,15 @@ def test_the_intrinsics_are_asked_for_and_the_path_named_once(tmp_path: Path) ->
     assert str(error.value) == f"{path}: {message}"
     with pytest.raises(InvalidInputError, match="a depth image needs the camera's intrinsics"):
         read(path, depth_scale=5000.0)
+
+
+def test_without_pillow_the_message_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.png").write_bytes(png(depths(3, 4)))
+    monkeypatch.setitem(sys.modules, "PIL.PngImagePlugin", None)
+    with pytest.raises(InvalidInputError, match=r"pip install 'surfsig\[image\]'"):
+        read(tmp_path / "a.png", intrinsics=INTRINSICS)
 
 
 @pytest.mark.parametrize(

@@ -94,6 +94,12 @@ def test_meshes_are_known_by_content(tmp_path: Path, name: str, kind: str) -> No
     assert format_name(save(tmp_path, "mesh.dat", CONTENTS[name])) == kind
 
 
+def test_84_zero_bytes_are_an_empty_stl_file_by_name_only(tmp_path: Path) -> None:
+    assert len(read(save(tmp_path, "a.stl", bytes(84)))) == 0
+    with pytest.raises(FileFormatError, match="is not a PLY file"):
+        read(save(tmp_path, "a.ply", bytes(84)))
+
+
 @pytest.mark.parametrize(
     "begin", ["# made by hand\r\n\r\n", "mtllib a.mtl\no thing\n", "vn 0 0 1\n", "\ufeff", "\n" * 3000]
 )

@@ -14,7 +14,7 @@ from surfsig.point_cloud import PointCloud
 
 _POINT_BYTES = 16
 _BLOCK_POINTS = 1 << 16
-# Metres: ten times what any such scanner sees would be less.
+# Metres: far beyond the reach of any scanner.
 _FARTHEST = 1e6
 
 

@@ -25,7 +25,8 @@ _WORD = re.compile(r"\s*(facet|vertex|endfacet|endsolid)\b(.*)", re.IGNORECASE)
 
 def is_whole_binary(head: bytes, size: int) -> bool:
     """Tell whether a file of `size` bytes holds as many facets as byte 80 says: binary STL has no magic."""
-    return len(head) >= _HEADER_BYTES and size == _HEADER_BYTES + _count(head) * _FACET.itemsize
+    count = _count(head)
+    return count > 0 and size == _HEADER_BYTES + count * _FACET.itemsize
 
 
 def read_ascii(file: BinaryIO, source: str, progress: Progress, samples: int | None = None) -> PointCloud:
