@@ -35,7 +35,10 @@ def read(
     depth_scale: float | None = None,
     progress: ProgressCallback | None = None,
 ) -> PointCloud:
-    """Read a point cloud: PLY, PCD, LAS, LAZ, COPC, E57, text (XYZ, CSV, TXT, ASC), NPY, NPZ or Parquet.
+    """Read a point cloud.
+
+    From PLY, PCD, LAS, LAZ, COPC, E57, text (XYZ, CSV, TXT, ASC), NPY, NPZ, Parquet, STL, OBJ, KITTI's .bin
+    or a depth image (PNG of 16 bits).
 
     Parameters
     ----------
@@ -92,7 +95,8 @@ def read(
     }  # fmt: skip
     given = {name: value for name, value in options.items() if value is not None}
     with path.open("rb") as file:
-        kind, reader = formats.of_content(path, file.read(formats.HEAD_BYTES))
+        size = os.fstat(file.fileno()).st_size
+        kind, reader = formats.of_content(path, file.read(formats.HEAD_BYTES), size)
         for name in given:
             if name not in kind.takes:
                 raise InvalidInputError(f"{path}: holds {kind.name} data, for which '{name}' means nothing")
@@ -100,7 +104,7 @@ def read(
             given["box"] = corners
         file.seek(0)
         try:
-            cloud = reader(file, str(path), Progress(progress, os.fstat(file.fileno()).st_size), **given)
+            cloud = reader(file, str(path), Progress(progress, size), **given)
         except MemoryError as error:
             raise FileFormatError(f"{path}: {error or 'too large for the memory'}") from error
         except InvalidInputError as error:
@@ -132,7 +136,7 @@ def format_name(path: str | os.PathLike[str]) -> str:
     """
     path = Path(path)
     with path.open("rb") as file:
-        kind, _ = formats.of_content(path, file.read(formats.HEAD_BYTES))
+        kind, _ = formats.of_content(path, file.read(formats.HEAD_BYTES), os.fstat(file.fileno()).st_size)
     return kind.name
 
 

@@ -7,12 +7,25 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol
+from typing import Any, BinaryIO, NamedTuple, Protocol
 
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError, InvalidInputError
-from surfsig.files import e57, e57_writer, numpy_files, parquet, pcd, pcd_write, ply, text
+from surfsig.files import (
+    depth_image,
+    e57,
+    e57_writer,
+    kitti,
+    numpy_files,
+    obj,
+    parquet,
+    pcd,
+    pcd_write,
+    ply,
+    stl,
+    text,
+)
 from surfsig.files.columns import Chunks
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
@@ -40,6 +53,24 @@ class Writer(Protocol):
         """Write everything; an exception leaves the file to the caller."""
 
 
+class Look(NamedTuple):
+    """What a file is recognised by.
+
+    Attributes
+    ----------
+    head
+        Its first bytes.
+    extension
+        In lower case, with the dot: for formats without a mark of their own.
+    size
+        Its bytes.
+    """
+
+    head: bytes
+    extension: str
+    size: int
+
+
 @dataclass(frozen=True)
 class Format:
     """A file format.
@@ -51,7 +82,7 @@ class Format:
     extensions
         In lower case, with the dot.
     recognise
-        Tells from the first bytes whether a file has this format.
+        Tells from the first bytes, or else extension and size, whether a file has this format.
     read
         Reads from an open file; None if the format is only recognised, to be named in a message. A name
         (MODULE:FUNCTION) where the library behind it takes a while to import.
@@ -67,7 +98,7 @@ class Format:
 
     name: str
     extensions: tuple[str, ...]
-    recognise: Callable[[bytes], bool]
+    recognise: Callable[[Look], bool]
     read: Reader | str | None = None
     write: Writer | str | None = None
     check: Callable[[], None] = lambda: None
@@ -75,20 +106,34 @@ class Format:
     takes: tuple[str, ...] = ()
 
 
-def _begins(*marks: bytes) -> Callable[[bytes], bool]:
-    return lambda head: head.startswith(marks)
+def _begins(*marks: bytes) -> Callable[[Look], bool]:
+    return lambda look: look.head.startswith(marks)
 
 
-def _matches(pattern: re.Pattern[bytes]) -> Callable[[bytes], bool]:
-    return lambda head: pattern.match(head) is not None
+def _matches(pattern: re.Pattern[bytes]) -> Callable[[Look], bool]:
+    return lambda look: pattern.match(look.head) is not None
 
 
-def _is_text(head: bytes) -> bool:
+def _is_text(look: Look) -> bool:
     # UTF-16 begins with its mark; any other text has no zero and hardly a control character.
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if look.head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return True
-    controls = sum(byte < 9 or 13 < byte < 32 for byte in head)
-    return 0 not in head and controls * 50 <= len(head)
+    controls = sum(byte < 9 or 13 < byte < 32 for byte in look.head)
+    return 0 not in look.head and controls * 50 <= len(look.head)
+
+
+def _is_binary_stl(look: Look) -> bool:
+    # One that is cut off is known by its name only.
+    cut_off = look.extension == ".stl" and not _is_text(look)
+    return cut_off or stl.is_whole_binary(look.head, look.size)
+
+
+def _is_obj(look: Look) -> bool:
+    return _is_text(look) and (look.extension == ".obj" or obj.MAGIC.match(look.head) is not None)
+
+
+def _is_kitti(look: Look) -> bool:
+    return look.extension == ".bin" and not _is_text(look) and kitti.is_plausible(look.head, look.size)
 
 
 def _function(of: Callable[..., Any] | str) -> Any:
@@ -104,7 +149,8 @@ _LAZ = re.compile(rb"LASF.{100}[\x80-\xff]", re.DOTALL)
 
 _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
 
-# The order matters: text comes last, because every PCD header and every HTML page is text as well.
+# The order matters: text comes last, because every PCD header and every HTML page is text as well; before it
+# those that have no mark of their own.
 FORMATS = (
     Format("PLY", (".ply",), _matches(ply.MAGIC), ply.read, ply.write),
     Format("PCD", (".pcd",), _matches(pcd.MAGIC), pcd.read, pcd_write.write, reserved=pcd_write.RESERVED),
@@ -123,20 +169,30 @@ FORMATS = (
     Format("LAZ", (".laz",), _matches(_LAZ), "las:read", "las_write:write_laz", takes=("box",)),
     Format("LAS", (".las",), _begins(b"LASF"), "las:read", "las_write:write_las", takes=("box",)),
     Format("E57", (".e57",), _begins(e57.MAGIC), e57.read, e57_writer.write, takes=("scan",)),
-    Format("PNG image", (".png",), _begins(b"\x89PNG")),
+    Format(
+        "PNG image",
+        (".png",),
+        _begins(depth_image.MAGIC),
+        depth_image.read,
+        takes=("intrinsics", "depth_scale"),
+    ),
     Format("JPEG image", (".jpg", ".jpeg"), _begins(b"\xff\xd8\xff")),
     Format("PDF", (".pdf",), _begins(b"%PDF")),
     Format("gzip archive", (".gz",), _begins(b"\x1f\x8b")),
     Format("binary glTF", (".glb",), _begins(b"glTF")),
-    Format("STL", (".stl",), _begins(b"solid ")),
     Format("HDF5", (".h5", ".hdf5"), _begins(b"\x89HDF")),
     Format("web page or XML", (".html", ".htm", ".xml"), _matches(_HTML)),
+    # A binary file may begin with "solid" too.
+    Format("STL", (".stl",), _is_binary_stl, stl.read_binary, takes=("samples",)),
+    Format("ASCII STL", (".stl",), _matches(stl.ASCII_MAGIC), stl.read_ascii, takes=("samples",)),
+    Format("KITTI", (".bin",), _is_kitti, kitti.read),
+    Format("OBJ", (".obj",), _is_obj, obj.read, takes=("samples",)),
     Format("text", (".xyz", ".csv", ".txt", ".asc"), _is_text, text.read),
 )
 
 
-def of_content(path: Path, head: bytes) -> tuple[Format, Reader]:
-    """Recognise a file by its first bytes, whatever its extension says.
+def of_content(path: Path, head: bytes, size: int) -> tuple[Format, Reader]:
+    """Recognise a file by its first bytes, whatever its extension says; only where those tell nothing by it.
 
     Raises
     ------
@@ -145,10 +201,11 @@ def of_content(path: Path, head: bytes) -> tuple[Format, Reader]:
     """
     if not head:
         raise FileFormatError(f"{path}: the file is empty")
-    by_name = next((kind for kind in FORMATS if path.suffix.lower() in kind.extensions), None)
+    look = Look(head, path.suffix.lower(), size)
+    by_name = next((kind for kind in FORMATS if look.extension in kind.extensions), None)
     readable = ", ".join(kind.name for kind in FORMATS if kind.read is not None)
     for kind in FORMATS:
-        if kind.recognise(head):
+        if kind.recognise(look):
             if kind.read is None:
                 raise FileFormatError(
                     f"{path}: holds {kind.name} data, which cannot be read (only {readable} can)"
