@@ -15,7 +15,7 @@ from surfsig._surfsig import INSTRUCTION_SET, Frame, __version__
 from surfsig.clean import crop, downsample, remove_outliers
 from surfsig.curvature import extract
 from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
-from surfsig.extraction import Extraction, Status
+from surfsig.extraction import Extraction, FitUsed, Status
 from surfsig.files import read, write
 from surfsig.flat_atom import flat_atom_length
 from surfsig.point_cloud import PointCloud
@@ -25,6 +25,7 @@ __all__ = [
     "INSTRUCTION_SET",
     "Extraction",
     "FileFormatError",
+    "FitUsed",
     "Frame",
     "InvalidInputError",
     "PointCloud",

@@ -31,6 +31,7 @@ def extract(
     origin: Sequence[float],
     radius: float | None,
     axes: str,
+    fit: str,
     neighbors: int | None = None,
     at: NDArray[np.uint32] | NDArray[np.float64] | None = None,
     viewpoint: Sequence[float] | None = None,

@@ -16,7 +16,7 @@ from surfsig.arguments import (
     thread_count,
     whole_number,
 )
-from surfsig.defaults import AXES, Axes
+from surfsig.defaults import AXES, FIT, Axes, Fit
 from surfsig.errors import InvalidInputError
 from surfsig.extraction import Extraction
 from surfsig.orientation import orientation
@@ -29,6 +29,7 @@ def extract(
     *,
     neighbors: int | None = None,
     axes: Axes = AXES,
+    fit: Fit = FIT,
     at: ArrayLike | None = None,
     voxel: float | None = None,
     viewpoint: ArrayLike | None = None,
@@ -53,6 +54,13 @@ def extract(
     axes
         "surface": the paraboloid's height runs along its own normal, and the result turns with the
         object. "sensor": along z, as the paper fits; z runs away from the sensor.
+    fit
+        "paraboloid": eq. (5), with the smallest spread, and a bias where the ball is not small against the
+        radius of curvature (13 % on a sphere of 1.5 balls). "quadric": a general quadric with Taubin's
+        normalisation, unbiased on spheres, cylinders, cones and ellipsoids of any size, wherever it stands
+        out of the noise (a rise of some 15 noise deviations within the ball, and no patch that is
+        one-sided); the paraboloid elsewhere. "auto": for each place what errs less. `Extraction.fit_used`
+        says which; only "paraboloid" in the sensor's axes.
     at
         Where: numbers of points (m,), or places of their own (m, 3); every point by default.
     voxel
@@ -90,6 +98,10 @@ def extract(
     most = None if neighbors is None else whole_number(neighbors, "neighbors", MOST_NEIGHBORS)
     if axes not in ("surface", "sensor"):
         raise InvalidInputError(f"axes must be 'surface' or 'sensor', not {axes!r}")
+    if fit not in ("paraboloid", "quadric", "auto"):
+        raise InvalidInputError(f"fit must be 'paraboloid', 'quadric' or 'auto', not {fit!r}")
+    if fit != "paraboloid" and axes == "sensor":
+        raise InvalidInputError("only fit='paraboloid' is fitted in the sensor's axes")
     if at is not None and voxel is not None:
         raise InvalidInputError("at and voxel exclude each other")
     origin: Sequence[float] = cloud.origin.tolist()
@@ -112,6 +124,7 @@ def extract(
         origin=origin,
         radius=size,
         axes=axes,
+        fit=fit,
         neighbors=most,
         at=query,
         viewpoint=None if sensor is None else sensor.tolist(),

@@ -9,6 +9,12 @@ Axes = Literal["surface", "sensor"]
 AXES: Axes = "surface"
 """The surface's own: results turn with the object."""
 
+Fit = Literal["paraboloid", "quadric", "auto"]
+"""Which surface is fitted."""
+
+FIT: Fit = "paraboloid"
+"""The paper's; it has the smallest spread, and the frame's atoms are such."""
+
 RADIUS = 0.02
 """Half the side of the paper's patch, in metres; where `surfsig compare` is given none."""
 

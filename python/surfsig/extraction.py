@@ -46,6 +46,17 @@ class Status(enum.IntEnum):
     errors, and biased where the surface is no paraboloid."""
 
 
+class FitUsed(enum.IntEnum):
+    """Whose curvature a place has."""
+
+    NONE = 0
+    """There is none."""
+    PARABOLOID = 1
+    """The paraboloid's."""
+    QUADRIC = 2
+    """The implicit quadric's."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Extraction:
     """Curvature at m places: one struct of arrays, with a status for each place.
@@ -96,6 +107,9 @@ class Extraction:
     """(l2 - l3) / l1, (m,)."""
     scattering: FloatArray
     """l3 / l1, (m,)."""
+    fit_used: NDArray[np.uint8] | None = field(default=None)
+    """Whose curvature each place has, (m,), a `FitUsed` as a number; None where only paraboloids were
+    fitted."""
     coefficients: FloatArray | None = field(default=None)
     """In the sensor's axes: a, b, c, d, e, f of eq. (5), (m, 6), about each place, with heights that
     grow away from the sensor."""
@@ -124,8 +138,9 @@ class Extraction:
     def noise(self) -> FloatArray:
         """Standard deviation of a point's distance to the surface, (m,), from the residual and the count."""
         count = self.count.astype(np.float32)
+        unknowns = 6 if self.fit_used is None else np.where(self.fit_used == FitUsed.QUADRIC, 9, 6)
         with np.errstate(invalid="ignore", divide="ignore"):
-            freedom = np.where(count > 6, count - 6, np.nan)
+            freedom = np.where(count > unknowns, count - unknowns, np.nan)
             return np.asarray(self.residual * np.sqrt(count / freedom), np.float32)
 
     @property
@@ -140,7 +155,7 @@ class Extraction:
         -------
         (m,) arrays: k1, k2, gaussian_curvature, mean_curvature, nx, ny, nz, direction_x, direction_y,
         direction_z, mean_curvature_std, k1_std, k2_std, noise, residual, condition, count, status, linearity,
-        planarity, scattering; and radius where each place has its own.
+        planarity, scattering; and radius where each place has its own, and fit_used where there is a choice.
         """
         columns: dict[str, NDArray[Any]] = {"k1": self.k1, "k2": self.k2}
         columns |= {"gaussian_curvature": self.gaussian_curvature, "mean_curvature": self.mean_curvature}
@@ -159,6 +174,8 @@ class Extraction:
         names += ["linearity", "planarity", "scattering"]
         if not isinstance(self.radius, float):
             names.insert(0, "radius")
+        if self.fit_used is not None:
+            names.append("fit_used")
         return columns | {name: getattr(self, name) for name in names}
 
     def to_pandas(self) -> pd.DataFrame:

@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 use surfsig::{
-    ExtractOptions, Extraction, FitAxes, Monitor, Neighborhood, Offsets, PointCloud, Queries, Radius,
+    ExtractOptions, Extraction, FitAxes, FitKind, Monitor, Neighborhood, Offsets, PointCloud, Queries, Radius,
 };
 
 /// How often the interpreter is asked for signals and told the progress.
@@ -51,7 +51,7 @@ fn neighborhood(radius: Option<f64>, neighbors: Option<usize>) -> PyResult<Neigh
 
 /// Extract curvature; see `surfsig.extract` for what the arguments and the arrays mean.
 #[pyfunction]
-#[pyo3(signature = (points, *, origin, radius, axes, neighbors=None, at=None, viewpoint=None, directions=None, robust=false, threads=None, progress=None))]
+#[pyo3(signature = (points, *, origin, radius, axes, fit, neighbors=None, at=None, viewpoint=None, directions=None, robust=false, threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
 pub fn extract<'py>(
     py: Python<'py>,
@@ -59,6 +59,7 @@ pub fn extract<'py>(
     origin: [f64; 3],
     radius: Option<f64>,
     axes: &str,
+    fit: &str,
     neighbors: Option<usize>,
     at: Option<At<'py>>,
     viewpoint: Option<[f64; 3]>,
@@ -78,9 +79,15 @@ pub fn extract<'py>(
         "sensor" => FitAxes::Sensor,
         other => return Err(PyValueError::new_err(format!("unknown axes '{other}'"))),
     };
+    let fit = match fit {
+        "paraboloid" => FitKind::Paraboloid,
+        "quadric" => FitKind::Quadric,
+        "auto" => FitKind::Auto,
+        other => return Err(PyValueError::new_err(format!("unknown fit '{other}'"))),
+    };
     let neighborhood = neighborhood(radius, neighbors)?;
     let directions = directions.as_ref().map(rows::<f32, 3>).transpose()?;
-    let options = ExtractOptions { axes, viewpoint, directions, robust, threads, instruction_set: None };
+    let options = ExtractOptions { axes, fit, viewpoint, directions, robust, threads, instruction_set: None };
     let monitor = Monitor::default();
     let total = queries.len(&cloud);
     let run = || surfsig::extract_monitored(&cloud, neighborhood, &queries, &options, &monitor);
@@ -128,6 +135,10 @@ fn to_arrays(py: Python<'_>, extraction: Extraction) -> PyResult<Bound<'_, PyDic
         Ok(PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])?.into_any())
     }
     let arrays = PyDict::new(py);
+    if !extraction.fit_used.is_empty() {
+        let used: Vec<u8> = extraction.fit_used.iter().map(|&used| used as u8).collect();
+        arrays.set_item("fit_used", used.into_pyarray(py))?;
+    }
     if !extraction.radii.is_empty() {
         arrays.set_item("radius", extraction.radii.into_pyarray(py))?;
     }

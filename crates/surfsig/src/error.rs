@@ -41,6 +41,9 @@ pub enum Error {
         /// The number of queries.
         queries: usize,
     },
+    /// An implicit quadric has no sensor's axes.
+    #[error("only a paraboloid is fitted in the sensor's axes")]
+    QuadricInSensorAxes,
     /// More points than 32-bit ranks can number.
     #[error("a cloud of {0} points is too large: at most 4294967295 are numbered; cut it into tiles")]
     TooManyPoints(usize),

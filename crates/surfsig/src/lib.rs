@@ -52,7 +52,9 @@ pub use extract::{
     ExtractOptions, Extraction, Monitor, Neighborhood, Queries, Status, extract, extract_monitored,
     voxel_representatives,
 };
-pub use fit::{Cylinder, FitAxes, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere};
+pub use fit::{
+    Cylinder, FitAxes, FitKind, FitUsed, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere,
+};
 pub use frame::{Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use point_cloud::{Offsets, PointCloud, Radius};

@@ -14,6 +14,7 @@ from surfsig.cli.console import number, on_terminal, print_json, print_table, pr
 from surfsig.cli.options import (
     CLOUD,
     axes_option,
+    fit_option,
     input_options,
     json_option,
     position,
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from surfsig import Extraction, PointCloud
-    from surfsig.defaults import Axes
+    from surfsig.defaults import Axes, Fit
     from surfsig.files import Chunks
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -58,6 +59,7 @@ QUANTILES = (0.05, 0.5, 0.95)
     help="Write zeta, the similarity of each point's surface with the one at this position.",
 )
 @axes_option
+@fit_option
 @click.option(
     "--at",
     type=position,
@@ -82,6 +84,7 @@ def extract_command(
     signatures: bool,
     like: tuple[float, float, float] | None,
     axes: Axes,
+    fit: Fit,
     at: tuple[tuple[float, float, float], ...],
     voxel: float | None,
     viewpoint: tuple[float, float, float] | None,
@@ -125,6 +128,7 @@ def extract_command(
             radius,
             neighbors=neighbors,
             axes=axes,
+            fit=fit,
             at=np.array(at) if at else None,
             voxel=voxel,
             viewpoint=viewpoint,

@@ -96,6 +96,17 @@ def axes_option(command: Function) -> Function:
     )(command)
 
 
+def fit_option(command: Function) -> Function:
+    """Add --fit."""
+    return click.option(
+        "--fit",
+        type=click.Choice(["paraboloid", "quadric", "auto"]),
+        default=defaults.FIT,
+        show_default=True,
+        help="The paper's surface; one that is unbiased on large balls; or for each point what errs less.",
+    )(command)
+
+
 def threads_option(command: Function) -> Function:
     """Add --threads."""
     return click.option(

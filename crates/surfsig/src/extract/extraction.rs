@@ -1,9 +1,11 @@
 //! What an extraction gives: one struct of arrays, a status per point.
 
+use super::ExtractOptions;
 use super::Status;
-use crate::curvature::Paraboloid;
-use crate::fit::FitAxes;
+use crate::curvature::{Paraboloid, Principal};
 use crate::fit::paraboloid::Paraboloids;
+use crate::fit::quadric::Quadrics;
+use crate::fit::{FitAxes, FitKind, FitUsed};
 use rayon::prelude::*;
 
 /// Curvature and what belongs to it, one entry for each query, in the order of the queries.
@@ -56,6 +58,8 @@ pub struct Extraction {
     pub k1_std: Vec<f32>,
     /// Standard error of k2.
     pub k2_std: Vec<f32>,
+    /// Whose curvature each query has. Empty where only paraboloids were fitted.
+    pub fit_used: Vec<FitUsed>,
     /// Points in the ball, the query itself included where it is one of the cloud's.
     pub count: Vec<u32>,
     /// What became of each query.
@@ -109,6 +113,7 @@ impl Extraction {
         take(&mut self.mean_curvature_std, queries, &with.mean_curvature_std);
         take(&mut self.k1_std, queries, &with.k1_std);
         take(&mut self.k2_std, queries, &with.k2_std);
+        take(&mut self.fit_used, queries, &with.fit_used);
         take(&mut self.count, queries, &with.count);
         take(&mut self.status, queries, &with.status);
         take(&mut self.linearity, queries, &with.linearity);
@@ -152,6 +157,7 @@ pub(super) struct Columns {
     mean_curvature_std: Vec<f32>,
     k1_std: Vec<f32>,
     k2_std: Vec<f32>,
+    fit_used: Vec<FitUsed>,
     count: Vec<u32>,
     status: Vec<Status>,
     linearity: Vec<f32>,
@@ -174,6 +180,8 @@ pub(super) struct ColumnsPart<'a> {
     mean_curvature_std: &'a mut [f32],
     k1_std: &'a mut [f32],
     k2_std: &'a mut [f32],
+    /// Empty where only paraboloids are fitted.
+    fit_used: &'a mut [FitUsed],
     count: &'a mut [u32],
     status: &'a mut [Status],
     linearity: &'a mut [f32],
@@ -183,11 +191,33 @@ pub(super) struct ColumnsPart<'a> {
     coefficients: &'a mut [[f32; 6]],
 }
 
+/// What was fitted to one query, a lane of a batch.
+pub(super) struct Fit<'a> {
+    pub paraboloid: &'a Paraboloids,
+    /// Where its curvature is the better one.
+    pub quadric: Option<&'a Quadrics>,
+    pub lane: usize,
+}
+
+impl Fit<'_> {
+    /// Curvature, residual, and the standard errors of k1, k2 and their mean, in units of the radius.
+    fn surface(&self) -> (&Principal, f64, [f64; 3]) {
+        let lane = self.lane;
+        if let Some(quadric) = self.quadric {
+            return (&quadric.principal, quadric.residual.0[lane], quadric.errors.map(|e| e.0[lane]));
+        }
+        let [c1, _, between, _, _, c2] = self.paraboloid.covariance.map(|c| c.0[lane]);
+        let mean = 0.5 * (c1 + between + between + c2).sqrt();
+        (&self.paraboloid.principal, self.paraboloid.residual.0[lane], [c1.sqrt(), c2.sqrt(), mean])
+    }
+}
+
 impl Columns {
-    pub fn new(len: usize, radius: f64, own_radii: bool, axes: FitAxes) -> Self {
+    pub fn new(len: usize, radius: f64, own_radii: bool, options: &ExtractOptions<'_>) -> Self {
         // Zeros cost nothing until they are written over, and then in many threads at once.
         let zeros = || vec![0.0; len];
-        let fitted = if axes == FitAxes::Sensor { len } else { 0 };
+        let fitted = if options.axes == FitAxes::Sensor { len } else { 0 };
+        let chosen = if options.fit == FitKind::Paraboloid { 0 } else { len };
         Self {
             radius,
             radii: if own_radii { zeros() } else { Vec::new() },
@@ -200,6 +230,7 @@ impl Columns {
             mean_curvature_std: zeros(),
             k1_std: zeros(),
             k2_std: zeros(),
+            fit_used: vec![FitUsed::None; chosen],
             count: vec![0; len],
             status: vec![Status::NotFinite; len],
             linearity: zeros(),
@@ -223,6 +254,7 @@ impl Columns {
             mean_curvature_std: &mut self.mean_curvature_std,
             k1_std: &mut self.k1_std,
             k2_std: &mut self.k2_std,
+            fit_used: &mut self.fit_used,
             count: &mut self.count,
             status: &mut self.status,
             linearity: &mut self.linearity,
@@ -255,6 +287,8 @@ impl Columns {
         let scalar = |column| ordered(column, &entries, f32::NAN);
         let vector = |column| ordered(column, &entries, [f32::NAN; 3]);
         let radii = if self.radii.is_empty() { Vec::new() } else { scalar(self.radii) };
+        let chosen = !self.fit_used.is_empty();
+        let fit_used = if chosen { ordered(self.fit_used, &entries, FitUsed::None) } else { Vec::new() };
         let coefficients = match axes {
             FitAxes::Surface => Vec::new(),
             FitAxes::Sensor => ordered(self.coefficients, &entries, [f32::NAN; 6]),
@@ -273,6 +307,7 @@ impl Columns {
             mean_curvature_std: scalar(self.mean_curvature_std),
             k1_std: scalar(self.k1_std),
             k2_std: scalar(self.k2_std),
+            fit_used,
             count: ordered(self.count, &entries, 0),
             status: ordered(self.status, &entries, Status::NotFinite),
             linearity: scalar(self.linearity),
@@ -302,6 +337,7 @@ impl ColumnsPart<'_> {
             mean_curvature_std: first(&mut self.mean_curvature_std, len),
             k1_std: first(&mut self.k1_std, len),
             k2_std: first(&mut self.k2_std, len),
+            fit_used: first(&mut self.fit_used, len),
             count: first(&mut self.count, len),
             status: first(&mut self.status, len),
             linearity: first(&mut self.linearity, len),
@@ -318,12 +354,17 @@ impl ColumnsPart<'_> {
 
     /// Writes one lane of a batch, which came in units of its neighbourhood's radius; that one is in
     /// units of the lattice's.
-    pub fn write(&mut self, entry: usize, count: f64, radius: f64, fits: &Paraboloids, lane: usize) {
+    pub fn write(&mut self, entry: usize, count: f64, radius: f64, fit: &Fit<'_>) {
+        let &Fit { paraboloid: fits, quadric, lane } = fit;
         let r = self.radius * radius;
         if let Some(own) = self.radii.get_mut(entry) {
             *own = r as f32;
         }
-        let status = if fits.too_few.get(lane) {
+        let status = if quadric.is_some() && !fits.one_sided.get(lane) {
+            Status::Ok
+        } else if quadric.is_some() {
+            Status::OneSided
+        } else if fits.too_few.get(lane) {
             Status::TooFewPoints
         } else if fits.no_plane.get(lane) || fits.singular.get(lane) {
             Status::Degenerate
@@ -343,16 +384,23 @@ impl ColumnsPart<'_> {
         self.planarity[entry] = ((l2 - l3) / l1) as f32;
         self.scattering[entry] = (l3 / l1) as f32;
         let plane = !fits.no_plane.get(lane);
-        self.normals[entry] = fits.principal.normal.map(|v| if plane { v.0[lane] as f32 } else { f32::NAN });
-        self.k1[entry] = curvature(fits.principal.k1.0[lane] / r);
-        self.k2[entry] = curvature(fits.principal.k2.0[lane] / r);
-        self.residual[entry] = curvature(fits.residual.0[lane] * r);
+        let (principal, residual, [k1_std, k2_std, mean_std]) = fit.surface();
+        self.normals[entry] = principal.normal.map(|v| if plane { v.0[lane] as f32 } else { f32::NAN });
+        self.k1[entry] = curvature(principal.k1.0[lane] / r);
+        self.k2[entry] = curvature(principal.k2.0[lane] / r);
+        self.residual[entry] = curvature(residual * r);
         self.condition[entry] = curvature(fits.condition.0[lane]);
-        let [c1, _, between, _, _, c2] = fits.covariance.map(|c| c.0[lane]);
-        self.k1_std[entry] = curvature(c1.sqrt() / r);
-        self.k2_std[entry] = curvature(c2.sqrt() / r);
-        self.mean_curvature_std[entry] = curvature(0.5 * (c1 + between + between + c2).sqrt() / r);
-        self.directions[entry] = fits.principal.direction.map(|v| curvature(v.0[lane]));
+        self.k1_std[entry] = curvature(k1_std / r);
+        self.k2_std[entry] = curvature(k2_std / r);
+        self.mean_curvature_std[entry] = curvature(mean_std / r);
+        if let Some(used) = self.fit_used.get_mut(entry) {
+            *used = match (fitted, quadric) {
+                (false, _) => FitUsed::None,
+                (true, None) => FitUsed::Paraboloid,
+                (true, Some(_)) => FitUsed::Quadric,
+            };
+        }
+        self.directions[entry] = principal.direction.map(|v| curvature(v.0[lane]));
         if let Some(coefficients) = self.coefficients.get_mut(entry) {
             // Heights grow away from the sensor, and the normal points to it.
             let sign = if fits.principal.normal[2].0[lane] > 0.0 { -1.0 } else { 1.0 };

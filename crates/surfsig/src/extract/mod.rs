@@ -17,9 +17,10 @@ pub use status::Status;
 
 use crate::ball::{DirectWalk, MomentSource};
 use crate::cell_index::{CellIndex, Row, RowKey};
-use crate::fit::FitAxes;
 use crate::fit::paraboloid::{Paraboloids, Task, fit_paraboloids};
-use crate::fit::tensor::MomentBatch;
+use crate::fit::quadric::{Quadrics, fit_quadrics};
+use crate::fit::tensor::{MomentBatch, Vector};
+use crate::fit::{FitAxes, FitKind};
 use crate::hierarchy::HierarchicalWalk;
 use crate::members::Members;
 use crate::moments::{Moments, Scalar};
@@ -27,7 +28,7 @@ use crate::simd::InstructionSet;
 use crate::simd::lanes::{LANES, Lanes};
 use crate::threads::with_threads;
 use crate::{Error, PointCloud, Radius};
-use extraction::{Columns, ColumnsPart};
+use extraction::{Columns, ColumnsPart, Fit};
 use neighborhood::first_radius;
 use rayon::prelude::*;
 use robust::without_outliers;
@@ -48,6 +49,8 @@ const RUN: usize = 32;
 pub struct ExtractOptions<'a> {
     /// Axes in which the paraboloids are fitted.
     pub axes: FitAxes,
+    /// Which surface is fitted.
+    pub fit: FitKind,
     /// Where the sensor stood, in the cloud's coordinates.
     pub viewpoint: Option<[f64; 3]>,
     /// In place of a viewpoint: for each query a vector to the side from which it was seen, such as a
@@ -113,6 +116,9 @@ pub fn extract_monitored(
 ) -> Result<Extraction, Error> {
     let neighborhood = neighborhood.into();
     neighborhood.check()?;
+    if options.fit != FitKind::Paraboloid && options.axes == FitAxes::Sensor {
+        return Err(Error::QuadricInSensorAxes);
+    }
     queries.check(cloud)?;
     if let Some(directions) = options.directions.map(<[_]>::len).filter(|&n| n != queries.len(cloud)) {
         return Err(Error::DirectionsMismatch { directions, queries: queries.len(cloud) });
@@ -171,9 +177,11 @@ fn run(
     let elsewhere = queries.index(cloud, radius, monitor)?;
     let asked = elsewhere.as_ref().unwrap_or(&index);
     let own_radii = !matches!(neighborhood, Neighborhood::Ball(_));
-    let mut columns = Columns::new(asked.len(), radius.get(), own_radii, options.axes);
+    let mut columns = Columns::new(asked.len(), radius.get(), own_radii, options);
     let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
-    let hierarchy = matches!(neighborhood, Neighborhood::Ball(_)) && !options.robust && std::env::var_os("SURFSIG_DIRECT").is_none();
+    let hierarchy = matches!(neighborhood, Neighborhood::Ball(_))
+        && !options.robust
+        && std::env::var_os("SURFSIG_DIRECT").is_none();
     let shares = shares(&index, asked, hierarchy);
     let parts = columns.parts(shares.iter().map(Share::len));
     // One by one, since some are large.
@@ -289,7 +297,12 @@ impl<'a> Worker<'a> {
         self.walk.enter_run(low, high);
         for rank in run.clone() {
             let offset = [x[rank], y[rank], z[rank]];
-            let (moments, radius) = self.around::<f32>(offset, self.pending.len());
+            let lane = self.pending.len();
+            let (moments, radius) = if self.exact() {
+                self.around::<f64>(offset, lane)
+            } else {
+                self.around::<f32>(offset, lane)
+            };
             let query = self.asked.point_of_rank[rank];
             let entry = entry + rank - start;
             self.pending.push(Pending { key, offset, leaf: None, entry, query, radius });
@@ -301,6 +314,11 @@ impl<'a> Worker<'a> {
             }
         }
         run.end
+    }
+
+    /// An implicit quadric needs sums in f64 from the start.
+    fn exact(&self) -> bool {
+        self.options.fit != FitKind::Paraboloid
     }
 
     /// The moments around a query in units of its neighbourhood's radius, and that radius in units of the
@@ -324,7 +342,8 @@ impl<'a> Worker<'a> {
             return false;
         }
         let mut fits = self.fit();
-        let again: Vec<usize> = (0..self.pending.len()).filter(|&lane| fits.needs_f64.get(lane)).collect();
+        let weak = |lane: &usize| !self.exact() && fits.needs_f64.get(*lane);
+        let again: Vec<usize> = (0..self.pending.len()).filter(weak).collect();
         for &lane in &again {
             let Pending { key, offset, leaf, .. } = self.pending[lane];
             self.moments[lane] = match leaf {
@@ -342,8 +361,14 @@ impl<'a> Worker<'a> {
         if self.options.robust {
             fits = self.fit_without_outliers(fits);
         }
+        let quadrics = self.fit_quadrics();
         for (lane, (query, moments)) in self.pending.iter().zip(&self.moments).enumerate() {
-            part.write(query.entry, moments.sums[0], query.radius, &fits, lane);
+            let quadric = quadrics.as_ref().filter(|quadrics| match self.options.fit {
+                FitKind::Auto => quadrics.preferred.get(lane),
+                _ => quadrics.trusted.get(lane),
+            });
+            let fit = Fit { paraboloid: &fits, quadric, lane };
+            part.write(query.entry, moments.sums[0], query.radius, &fit);
         }
         self.pending.clear();
         self.moments.clear();
@@ -371,12 +396,28 @@ impl<'a> Worker<'a> {
     }
 
     fn fit(&self) -> Paraboloids {
-        let batch = MomentBatch::new(&self.moments);
+        let moments = &MomentBatch::new(&self.moments);
+        let (axes, to_sensor) = (self.options.axes, self.to_sensor());
+        fit_paraboloids(self.set, &Task { moments, axes, to_sensor })
+    }
+
+    /// The implicit quadrics, where they are asked for.
+    fn fit_quadrics(&self) -> Option<Quadrics> {
+        if self.options.fit == FitKind::Paraboloid {
+            return None;
+        }
+        let moments = &MomentBatch::new(&self.moments);
+        let (axes, to_sensor) = (self.options.axes, self.to_sensor());
+        Some(fit_quadrics(self.set, &Task { moments, axes, to_sensor }))
+    }
+
+    /// From each pending query to the side from which it was seen, where somebody knows.
+    fn to_sensor(&self) -> Option<Vector> {
         let pending = |lane: usize| self.pending[lane.min(self.pending.len() - 1)];
         let each = |towards: &dyn Fn(Pending, usize) -> f64| {
             [0, 1, 2].map(|axis| Lanes(std::array::from_fn(|lane| towards(pending(lane), axis))))
         };
-        let to_sensor = match (self.options.viewpoint, self.options.directions) {
+        match (self.options.viewpoint, self.options.directions) {
             (Some(viewpoint), _) => Some(each(&|Pending { key, offset, .. }, axis| {
                 viewpoint[axis] - self.asked.lattice.middle(key)[axis] - f64::from(offset[axis])
             })),
@@ -384,7 +425,6 @@ impl<'a> Worker<'a> {
                 Some(each(&|Pending { query, .. }, axis| f64::from(directions[query as usize][axis])))
             }
             (None, None) => None,
-        };
-        fit_paraboloids(self.set, &Task { moments: &batch, axes: self.options.axes, to_sensor })
+        }
     }
 }

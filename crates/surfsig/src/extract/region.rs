@@ -36,7 +36,11 @@ impl Worker<'_> {
                         query: self.asked.point_of_rank[rank],
                         radius: 1.0,
                     });
-                    self.moments.push(self.hierarchical.moments::<f32>(leaf, offset(rank)));
+                    self.moments.push(if self.exact() {
+                        self.hierarchical.moments::<f64>(leaf, offset(rank))
+                    } else {
+                        self.hierarchical.moments::<f32>(leaf, offset(rank))
+                    });
                     if self.pending.len() == LANES {
                         self.fit_pending(part);
                     }

@@ -4,6 +4,7 @@ mod covariance;
 mod cylinder;
 mod eigen;
 mod implicit;
+mod kind;
 pub(crate) mod paraboloid;
 pub(crate) mod quadric;
 #[cfg(test)]
@@ -15,5 +16,6 @@ pub(crate) mod tensor;
 
 pub use cylinder::{Cylinder, fit_cylinder};
 pub use implicit::{Quadric, SurfacePoint, fit_quadric};
+pub use kind::{FitKind, FitUsed};
 pub use paraboloid::FitAxes;
 pub use sphere::{Sphere, fit_sphere};

@@ -34,10 +34,10 @@ const TRUSTED_GAP: f64 = 4.0;
 const PARABOLOID_BIAS: f64 = 0.25;
 
 /// The fits of a batch, lengths in units of the radius.
-#[allow(dead_code, reason = "the extraction reads all of it once it offers this fit")]
 pub(crate) struct Quadrics {
     /// At the foot of the query, its projection onto the surface.
     pub principal: Principal,
+    #[cfg_attr(not(test), expect(dead_code, reason = "what the tests compare with the surface"))]
     pub foot: Vector,
     /// Of 1, x, y, z, xx, xy, xz, yy, yz, zz; the mean square of the gradient is 1.
     pub coefficients: [Lanes; TERMS + 1],
@@ -51,6 +51,7 @@ pub(crate) struct Quadrics {
     /// Enough points, and an eigenvector that no longer changes.
     pub settled: Mask,
     /// Settled, and with a foot inside the ball.
+    #[cfg_attr(not(test), expect(dead_code, reason = "what the tests ask where nothing is trusted"))]
     pub converged: Mask,
     /// Converged, and with a gap that makes the standard errors those of many draws.
     pub trusted: Mask,

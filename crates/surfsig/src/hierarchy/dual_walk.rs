@@ -147,7 +147,8 @@ impl<'a> HierarchicalWalk<'a> {
             while end > frame.queries.start {
                 let octant_of = |query: u64| octant(query >> 32, size);
                 let number = octant_of(self.queries[end - 1]);
-                let before = self.queries[frame.queries.start..end].partition_point(|&q| octant_of(q) < number);
+                let before =
+                    self.queries[frame.queries.start..end].partition_point(|&q| octant_of(q) < number);
                 let start = frame.queries.start + before;
                 let cube = frame.cube.octant(number);
                 let node = children.clone().find(|&child| self.forest.nodes[child as usize].cube == cube);
@@ -244,9 +245,14 @@ impl<'a> HierarchicalWalk<'a> {
             };
             let first = leaf.rim.len;
             // Neighbouring leaves have neighbouring points.
-            let adjoin = |a: &Source, b: &Source| nodes[a.node as usize].end_point == nodes[b.node as usize].first_point;
+            let adjoin = |a: &Source, b: &Source| {
+                nodes[a.node as usize].end_point == nodes[b.node as usize].first_point
+            };
             for run in row.chunk_by(adjoin) {
-                let (from, to) = (nodes[run[0].node as usize].points().start, nodes[run[run.len() - 1].node as usize].points().end);
+                let (from, to) = (
+                    nodes[run[0].node as usize].points().start,
+                    nodes[run[run.len() - 1].node as usize].points().end,
+                );
                 for start in (from..to).step_by(PIECE) {
                     let ranks = start..to.min(start + PIECE);
                     split(self.set, points, ranks, cube, &mut self.block, &mut leaf.rim);

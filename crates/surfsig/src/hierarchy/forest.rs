@@ -210,9 +210,11 @@ impl<'a> Forest<'a> {
         self.curve.clear();
         let offset = |rank: usize| [x[rank], y[rank], z[rank]];
         // Points of one part keep the order of the row.
-        self.curve.extend((start..end).map(|rank| {
-            u64::from(place_on_curve(lattice.part(offset(rank)))) << 32 | (rank - start) as u64
-        }));
+        self.curve.extend(
+            (start..end).map(|rank| {
+                u64::from(place_on_curve(lattice.part(offset(rank)))) << 32 | (rank - start) as u64
+            }),
+        );
         self.curve.sort_unstable();
         let first_point = self.points as u32;
         for (column, values) in [(&mut self.x, x), (&mut self.y, y), (&mut self.z, z)] {
