@@ -136,7 +136,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
     ("content", "message"),
     [
         (b"", "the file is empty"),
-        (b"\x89PNG\r\n\x1a\n" + bytes(100), "holds PNG image data, which cannot be read"),
+        (b"\xff\xd8\xff" + bytes(100), "holds JPEG image data, which cannot be read"),
         (b"<!DOCTYPE html>\n<html><body>404</body></html>\n", "holds web page or XML data"),
         (np.random.default_rng(3).bytes(5000), "is not a PLY file, nor any other that can be read"),
         (bytes(100), "is not a PLY file"),

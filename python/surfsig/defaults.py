@@ -31,3 +31,6 @@ pairs.
 
 PAPER_SEEDS = 5
 """Draws of noise and poses in the paper's reproduction: an odd number, so that one is in the middle."""
+
+DEPTH_SCALE = 1000.0
+"""Units of a depth image's numbers per unit of length: millimetres to metres."""

@@ -35,12 +35,16 @@ def read(
     depth_scale: float | None = None,
     progress: ProgressCallback | None = None,
 ) -> PointCloud:
-    """Read a point cloud: PLY, PCD, LAS, LAZ, COPC, E57, text (XYZ, CSV, TXT, ASC), NPY, NPZ or Parquet.
+    """Read a point cloud.
+
+    Formats: PLY, PCD, LAS, LAZ, COPC, E57, text (XYZ, CSV, TXT, ASC), NPY, NPZ, Parquet, meshes (OBJ, STL),
+    depth images (PNG), KITTI's scans (BIN).
 
     Parameters
     ----------
     path
-        The file; its content, not its extension, decides how it is read.
+        The file; its content, not its extension, decides how it is read (only KITTI's scans, which are bare
+        numbers, need theirs, ``.bin``).
     box
         Only the points in this box: (2, 3), its lowest and its highest corner, in the file's coordinates and
         unit; both belong to it. A COPC file is read no further than the box asks for.
@@ -50,9 +54,11 @@ def read(
     scan
         Of an E57 file with several scans, the one with this number, from 0; by default all of them.
     samples
-        Of a mesh (OBJ, STL), this many points spread evenly over its surface, in place of its vertices.
+        Of a mesh (OBJ, STL), this many points spread evenly over its surface, in place of its vertices;
+        the same ones each time.
     intrinsics
-        Of a depth image: (fx, fy, cx, cy) in pixels.
+        Of a depth image: the camera's (fx, fy, cx, cy) in pixels, with the middle of the first pixel at
+        (0, 0). Nobody can tell them from the image.
     depth_scale
         Of a depth image: units of its numbers per unit of length; 1000 by default (millimetres to metres).
     progress
@@ -61,7 +67,8 @@ def read(
     Returns
     -------
     PointCloud
-        Coordinates in the file's precision (text: float64), with all other values of its points as fields.
+        Coordinates in the file's precision (text, and points on a mesh: float64), with all other values of
+        its points as fields. A depth image and a KITTI scan are seen from (0, 0, 0).
 
     Raises
     ------
@@ -70,7 +77,8 @@ def read(
     FileFormatError
         If it is no point cloud, broken, or cut off.
     InvalidInputError
-        If an option has no meaning, or none for this file's format.
+        If an option has no meaning, or none for this file's format; if a depth image's intrinsics, or the
+        library for a format, are missing.
 
     Warns
     -----
@@ -86,20 +94,19 @@ def read(
     }  # fmt: skip
     given = {name: value for name, value in options.items() if value is not None}
     with path.open("rb") as file:
-        kind, reader = formats.of_content(path, file.read(formats.HEAD_BYTES))
+        kind, reader = formats.of_content(path, file)
         for name in given:
             if name not in kind.takes:
                 raise InvalidInputError(f"{path}: holds {kind.name} data, for which '{name}' means nothing")
         if corners is not None and "box" in kind.takes:
             given["box"] = corners
-        file.seek(0)
         try:
             cloud = reader(file, str(path), Progress(progress, os.fstat(file.fileno()).st_size), **given)
         except MemoryError as error:
             raise FileFormatError(f"{path}: {error or 'too large for the memory'}") from error
         except InvalidInputError as error:
-            # With options the caller may be wrong, without any only the file can be.
-            if given:
+            # With options the caller may be wrong, or without those that the format needs; else the file is.
+            if given or kind.needs:
                 raise
             raise FileFormatError(f"{path}: {error}") from error
     if corners is not None:
@@ -117,7 +124,7 @@ def format_name(path: str | os.PathLike[str]) -> str:
     """
     path = Path(path)
     with path.open("rb") as file:
-        kind, _ = formats.of_content(path, file.read(formats.HEAD_BYTES))
+        kind, _ = formats.of_content(path, file)
     return kind.name
 
 

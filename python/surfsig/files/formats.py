@@ -11,13 +11,25 @@ from typing import Any, BinaryIO, Protocol
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError, InvalidInputError
-from surfsig.files import e57, e57_writer, las, las_write, numpy_files, parquet, pcd, ply, text
+from surfsig.files import (
+    depth_image,
+    e57,
+    e57_writer,
+    kitti,
+    las,
+    las_write,
+    numpy_files,
+    obj,
+    parquet,
+    pcd,
+    ply,
+    stl,
+    text,
+)
 from surfsig.files.columns import Chunks
+from surfsig.files.opening import Opening, Recogniser, begins, matches
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
-
-HEAD_BYTES = 4096
-
 
 # Reads from an open file with a name (for messages); the options that the format takes come by keyword.
 Reader = Callable[..., PointCloud]
@@ -50,7 +62,7 @@ class Format:
     extensions
         In lower case, with the dot.
     recognise
-        Tells from the first bytes whether a file has this format.
+        Tells from what can be seen of a file at once whether it has this format.
     read
         Reads from an open file; None if the format is only recognised, to be named in a message.
     write
@@ -61,81 +73,79 @@ class Format:
         Names that a column cannot have.
     takes
         The options of `surfsig.read` that mean something to this format's reader.
+    needs
+        Those of them without which nothing can be read.
     """
 
     name: str
     extensions: tuple[str, ...]
-    recognise: Callable[[bytes], bool]
+    recognise: Recogniser
     read: Reader | None = None
     write: Writer | None = None
     check: Callable[[], None] = lambda: None
     reserved: tuple[str, ...] = ("x", "y", "z")
     takes: tuple[str, ...] = ()
-
-
-def _begins(*marks: bytes) -> Callable[[bytes], bool]:
-    return lambda head: head.startswith(marks)
-
-
-def _matches(pattern: re.Pattern[bytes]) -> Callable[[bytes], bool]:
-    return lambda head: pattern.match(head) is not None
-
-
-def _is_text(head: bytes) -> bool:
-    # UTF-16 begins with its mark; any other text has no zero and hardly a control character.
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return True
-    controls = sum(byte < 9 or 13 < byte < 32 for byte in head)
-    return 0 not in head and controls * 50 <= len(head)
+    needs: tuple[str, ...] = ()
 
 
 _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
 
-# The order matters: text comes last, because every PCD header and every HTML page is text as well.
+# The order matters: what the content tells comes before what size and extension tell, and text comes last,
+# because every PCD header, every OBJ file and every HTML page is text as well.
 FORMATS = (
-    Format("PLY", (".ply",), _matches(ply.MAGIC), ply.read, ply.write),
-    Format("PCD", (".pcd",), _matches(pcd.MAGIC), pcd.read),
-    Format("NPY", (".npy",), _begins(numpy_files.NPY_MAGIC), numpy_files.read_npy),
+    Format("PLY", (".ply",), matches(ply.MAGIC), ply.read, ply.write),
+    Format("PCD", (".pcd",), matches(pcd.MAGIC), pcd.read),
+    Format("NPY", (".npy",), begins(numpy_files.NPY_MAGIC), numpy_files.read_npy),
     Format(
         "NPZ",
         (".npz",),
-        _begins(numpy_files.ZIP_MAGIC),
+        begins(numpy_files.ZIP_MAGIC),
         numpy_files.read_npz,
         numpy_files.write_npz,
         reserved=(*numpy_files.RESERVED, "x", "y", "z"),
     ),
     Format(
-        "Parquet", (".parquet",), _begins(parquet.MAGIC), parquet.read, parquet.write, parquet.check_available
+        "Parquet", (".parquet",), begins(parquet.MAGIC), parquet.read, parquet.write, parquet.check_available
     ),
-    Format("LAZ", (".laz",), _matches(las.LAZ_MAGIC), las.read, las_write.write_laz, takes=("box",)),
-    Format("LAS", (".las",), _begins(las.MAGIC), las.read, las_write.write_las, takes=("box",)),
-    Format("E57", (".e57",), _begins(e57.MAGIC), e57.read, e57_writer.write, takes=("scan",)),
-    Format("PNG image", (".png",), _begins(b"\x89PNG")),
-    Format("JPEG image", (".jpg", ".jpeg"), _begins(b"\xff\xd8\xff")),
-    Format("PDF", (".pdf",), _begins(b"%PDF")),
-    Format("gzip archive", (".gz",), _begins(b"\x1f\x8b")),
-    Format("binary glTF", (".glb",), _begins(b"glTF")),
-    Format("STL", (".stl",), _begins(b"solid ")),
-    Format("HDF5", (".h5", ".hdf5"), _begins(b"\x89HDF")),
-    Format("web page or XML", (".html", ".htm", ".xml"), _matches(_HTML)),
-    Format("text", (".xyz", ".csv", ".txt", ".asc"), _is_text, text.read),
+    Format("LAZ", (".laz",), matches(las.LAZ_MAGIC), las.read, las_write.write_laz, takes=("box",)),
+    Format("LAS", (".las",), begins(las.MAGIC), las.read, las_write.write_las, takes=("box",)),
+    Format("E57", (".e57",), begins(e57.MAGIC), e57.read, e57_writer.write, takes=("scan",)),
+    Format(
+        "PNG image",
+        (".png",),
+        begins(depth_image.MAGIC),
+        depth_image.read,
+        takes=("intrinsics", "depth_scale"),
+        needs=("intrinsics",),
+    ),
+    Format("JPEG image", (".jpg", ".jpeg"), begins(b"\xff\xd8\xff")),
+    Format("PDF", (".pdf",), begins(b"%PDF")),
+    Format("gzip archive", (".gz",), begins(b"\x1f\x8b")),
+    Format("binary glTF", (".glb",), begins(b"glTF")),
+    Format("HDF5", (".h5", ".hdf5"), begins(b"\x89HDF")),
+    Format("web page or XML", (".html", ".htm", ".xml"), matches(_HTML)),
+    Format("STL", (".stl",), stl.recognise, stl.read, takes=("samples",)),
+    Format("OBJ", (".obj",), obj.recognise, obj.read, takes=("samples",)),
+    Format("KITTI", (".bin",), kitti.recognise, kitti.read),
+    Format("text", (".xyz", ".csv", ".txt", ".asc"), lambda opening: opening.is_text, text.read),
 )
 
 
-def of_content(path: Path, head: bytes) -> tuple[Format, Reader]:
-    """Recognise a file by its first bytes, whatever its extension says.
+def of_content(path: Path, file: BinaryIO) -> tuple[Format, Reader]:
+    """Recognise an open file by its content, by its extension only where that says nothing.
 
     Raises
     ------
     FileFormatError
         If it is nothing that can be read; the message says what it is, where that is known.
     """
-    if not head:
+    opening = Opening.of(path, file)
+    if not opening.head:
         raise FileFormatError(f"{path}: the file is empty")
-    by_name = next((kind for kind in FORMATS if path.suffix.lower() in kind.extensions), None)
+    by_name = next((kind for kind in FORMATS if opening.extension in kind.extensions), None)
     readable = ", ".join(kind.name for kind in FORMATS if kind.read is not None)
     for kind in FORMATS:
-        if kind.recognise(head):
+        if kind.recognise(opening):
             if kind.read is None:
                 raise FileFormatError(
                     f"{path}: holds {kind.name} data, which cannot be read (only {readable} can)"

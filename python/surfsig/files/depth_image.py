@@ -1,0 +1,136 @@
+"""Depth images: PNG through Pillow, which is an optional dependency (``surfsig[image]``)."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfsig import defaults
+from surfsig.errors import FileFormatError, InvalidInputError
+from surfsig.files.progress import Progress
+from surfsig.point_cloud import PointCloud
+
+MAGIC = b"\x89PNG"
+
+# Deflate makes at most 1032 bytes of one.
+_MAX_RATIO = 1032
+# Signature, then the chunk IHDR: its length and name, width, height, bits per channel, type of colour.
+_HEADER = np.dtype(
+    [
+        ("signature", "V8"),
+        ("name", "V8"),
+        ("width", ">u4"),
+        ("height", ">u4"),
+        ("bits", "u1"),
+        ("colour", "u1"),
+    ]
+)
+_GREY = 0
+
+
+def check_available() -> None:
+    """Make sure that Pillow is installed; an `InvalidInputError` says how to."""
+    try:
+        import PIL.Image  # noqa: F401
+    except ImportError:
+        raise InvalidInputError("depth images need Pillow: pip install 'surfsig[image]'") from None
+
+
+def read(
+    file: BinaryIO,
+    source: str,
+    progress: Progress,
+    intrinsics: ArrayLike | None = None,
+    depth_scale: float = defaults.DEPTH_SCALE,
+) -> PointCloud:
+    """Read an open PNG image of depths as an organised cloud, seen from (0, 0, 0).
+
+    The pixel in column u and row v, from 0, of depth d is the point z = d / depth_scale,
+    x = (u - cx) z / fx, y = (v - cy) z / fy, in float32; a depth of 0 is none, and the point NaN.
+
+    Raises
+    ------
+    FileFormatError
+        If the image is cut off, broken, or one of colours.
+    InvalidInputError
+        If `intrinsics` are missing or make no sense, or `depth_scale` does not.
+    """
+    size = os.fstat(file.fileno()).st_size
+    _check_header(file.read(_HEADER.itemsize), size, source)
+    fx, fy, cx, cy = _camera(intrinsics, source)
+    scale = _scale(depth_scale, source)
+    check_available()
+    depths = _decoded(file, source)
+    progress.advance(size)
+    height, width = depths.shape
+    points = np.empty((height, width, 3), np.float32)
+    for row, line in enumerate(depths):
+        z = np.where(line == 0, np.nan, line / scale)
+        points[row, :, 0] = (np.arange(width) - cx) * z / fx
+        points[row, :, 1] = (row - cy) * z / fy
+        points[row, :, 2] = z
+    return PointCloud(points.reshape(-1, 3), viewpoint=np.zeros(3), grid=(height, width))
+
+
+def _check_header(head: bytes, size: int, source: str) -> None:
+    if len(head) < _HEADER.itemsize:
+        raise FileFormatError(f"{source}: the PNG image is cut off")
+    header = np.frombuffer(head, _HEADER)[0]
+    if header["colour"] != _GREY:
+        raise FileFormatError(f"{source}: is a colour image, not one of depths")
+    width, height, bits = (int(header[name]) for name in ("width", "height", "bits"))
+    if bits not in (8, 16):
+        raise FileFormatError(f"{source}: its pixels have {bits} bits, depths 8 or 16")
+    if width * height * bits > 8 * _MAX_RATIO * size:
+        raise FileFormatError(
+            f"{source}: cut off or broken: its header promises {width} x {height} pixels, "
+            f"the file has {size} bytes"
+        )
+
+
+def _camera(intrinsics: ArrayLike | None, source: str) -> list[float]:
+    if intrinsics is None:
+        raise InvalidInputError(
+            f"{source}: a depth image needs the camera's intrinsics in pixels: intrinsics=(fx, fy, cx, cy), "
+            "in the shell --intrinsics fx,fy,cx,cy"
+        )
+    try:
+        values = np.array(intrinsics, np.float64)
+    except (TypeError, ValueError):
+        values = np.empty(0)
+    if values.shape != (4,) or not np.isfinite(values).all() or not (values[:2] > 0).all():
+        raise InvalidInputError(
+            f"{source}: intrinsics must be four numbers (fx, fy, cx, cy), fx and fy above 0"
+        )
+    return [float(value) for value in values]
+
+
+def _scale(depth_scale: float, source: str) -> float:
+    try:
+        scale = float(depth_scale)
+    except (TypeError, ValueError):
+        scale = np.nan
+    if not 0 < scale < np.inf:
+        raise InvalidInputError(f"{source}: depth_scale must be a positive number")
+    return scale
+
+
+def _decoded(file: BinaryIO, source: str) -> NDArray[Any]:
+    """Give the image's numbers (height, width)."""
+    from PIL import Image
+
+    file.seek(0)
+    try:
+        with warnings.catch_warnings():
+            # Pillow warns of sizes that the file's own has justified.
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(file, formats=["PNG"]) as image:
+                return np.asarray(image)
+    # Besides OSError, a broken chunk raises whatever Pillow's parser of it may raise.
+    except Exception as error:
+        reason = " ".join(str(error).split())[:100]
+        raise FileFormatError(f"{source}: the PNG image is cut off or broken ({reason})") from None
