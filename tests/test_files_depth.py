@@ -140,3 +140,14 @@ def test_images_that_are_no_depths(tmp_path: Path, content: bytes, message: str)
 def test_a_colour_image_is_named_before_intrinsics_are_asked_for(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match="is a colour image"):
         read(saved(tmp_path, png(np.zeros((4, 4, 3), np.uint8))))
+
+
+def test_a_chunk_that_claims_gigabytes_allocates_none(tmp_path: Path) -> None:
+    content = png(depths()).replace(struct.pack(">I", 13) + b"IHDR", struct.pack(">I", 0xF0000000) + b"IHDR")
+    tracemalloc.start()
+    try:
+        with pytest.raises(FileFormatError, match="cut off or broken"):
+            read(saved(tmp_path, content), intrinsics=CAMERA)
+        assert tracemalloc.get_traced_memory()[1] < 20e6
+    finally:
+        tracemalloc.stop()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import warnings
 from typing import Any, BinaryIO
@@ -124,11 +125,13 @@ def _decoded(file: BinaryIO, source: str) -> NDArray[Any]:
     from PIL import Image
 
     file.seek(0)
+    # From a buffer: reading from a file, Python allocates whatever length a broken chunk claims to have.
+    content = io.BytesIO(file.read())
     try:
         with warnings.catch_warnings():
             # Pillow warns of sizes that the file's own has justified.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(file, formats=["PNG"]) as image:
+            with Image.open(content, formats=["PNG"]) as image:
                 return np.asarray(image)
     # Besides OSError, a broken chunk raises whatever Pillow's parser of it may raise.
     except Exception as error:
