@@ -13,7 +13,7 @@ import pytest
 
 import surfsig
 
-COMMANDS = ("info", "extract", "compare", "completion")
+COMMANDS = ("info", "extract", "compare", "convert", "completion")
 
 
 def one_line(finished: Any) -> str:
@@ -42,6 +42,7 @@ def test_inputs(shell: Callable[..., Any], tmp_path: Path, content: bytes | None
         ("info", path),
         ("extract", path, "--radius", 1, "-o", tmp_path / "o.ply"),
         ("compare", path, path, "--at", "0,0,0", "--at", "0,0,0"),
+        ("convert", path, tmp_path / "o.ply"),
     ):
         assert message in one_line(shell(*command))
     assert not (tmp_path / "o.ply").exists()
@@ -68,6 +69,14 @@ def test_radii(shell: Callable[..., Any], ball: Path, tmp_path: Path, radius: st
         (("--radius", 1, "--viewpoint", "1,2,nan"), "viewpoint"),
         (("--radius", 1, "--voxel", 0), "voxel"),
         (("--radius", 1, "--threads", 0), "threads"),
+        (("--radius", 1, "--unit", "parsec"), "'parsec' is not one of 'mm', 'cm'"),
+        (("--radius", 1, "--box", "0,0,0,1,1"), "'0,0,0,1,1' is not six numbers"),
+        (("--radius", 1, "--box", "0,0,0,1,-1,1"), "box must be two corners"),
+        (("--radius", 1, "--intrinsics", "1,2,3"), "'1,2,3' is not four numbers"),
+        (("--radius", 1, "--scan", 0), "holds PLY data, for which 'scan' means nothing"),
+        (("--radius", 1, "--samples", 9), "for which 'samples' means nothing"),
+        (("--radius", 1, "--intrinsics", "1,2,3,4"), "for which 'intrinsics' means nothing"),
+        (("--radius", 1, "--depth-scale", 500), "for which 'depth_scale' means nothing"),
         (("--radius", 1, "--frobnicate"), "No such option"),
     ],
 )

@@ -52,7 +52,7 @@ def test_curvature_of_a_ball(shell: Callable[..., Any], ball: Path, tmp_path: Pa
     assert summary["points_per_second"] > 0
 
 
-@pytest.mark.parametrize("extension", ["ply", "npz", "parquet"])
+@pytest.mark.parametrize("extension", ["ply", "pcd", "npz", "parquet"])
 def test_signatures_are_those_of_python(
     shell: Callable[..., Any], ball: Path, tmp_path: Path, extension: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

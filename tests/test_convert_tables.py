@@ -1,5 +1,6 @@
 """pandas DataFrames and Arrow tables, in and out."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -168,6 +169,14 @@ def test_tables_that_are_no_cloud() -> None:
             PointCloud.of(table)
 
 
+def test_a_column_without_numbers_has_no_type_in_arrow(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    cloud = PointCloud(POINTS, fields={"none": np.zeros((4, 0))})
+    for give in (cloud.to_arrow, lambda: surfsig.write(tmp_path / "a.parquet", cloud)):
+        with pytest.raises(InvalidInputError, match=r"cannot hold a column \(n, 0\)"):
+            give()
+
+
 def test_columns_of_an_extraction(extraction: surfsig.Extraction) -> None:
     columns = extraction.columns()
     assert list(columns) == COLUMNS
@@ -196,7 +205,7 @@ def test_an_extraction_in_arrow(extraction: surfsig.Extraction, tmp_path: Path) 
     assert table.column_names == ["x", "y", "z", *COLUMNS]
     for name, values in extraction.columns().items():
         np.testing.assert_array_equal(table.column(name), values)
-    assert table.schema.metadata[b"surfsig"] == b'{"radius": "0.6", "axes": "surface"}'
+    assert json.loads(table.schema.metadata[b"surfsig"]) == {"radius": "0.6", "axes": "surface"}
     surfsig.write(tmp_path / "a.parquet", table)
     np.testing.assert_array_equal(surfsig.read(tmp_path / "a.parquet").fields["k1"], extraction.k1)
 

@@ -20,7 +20,7 @@ from surfsig.errors import InvalidInputError
 from surfsig.files import Chunks, check_writable, read, write
 from surfsig.point_cloud import PointCloud
 
-EXTENSIONS = ["ply", "npz", "parquet"]
+EXTENSIONS = ["ply", "pcd", "npz", "parquet"]
 DTYPES = st.sampled_from(["f4", "f8", "i1", "u1", "i2", "u2", "i4", "u4"])
 # Names that no format reserves, that are no colour, and that differ in more than case.
 NAMES = st.lists(st.from_regex(r"[d-w][d-w_]{2,8}", fullmatch=True), max_size=3, unique=True).filter(
@@ -248,7 +248,7 @@ def test_names_with_spaces_in_ply(tmp_path: Path) -> None:
     [
         ("missing/a.ply", FileNotFoundError, "No such file or directory"),
         ("folder.ply", InvalidInputError, "is a folder"),
-        ("a.obj", InvalidInputError, r"must be one of \.ply, \.npz, \.parquet"),
+        ("a.obj", InvalidInputError, r"must be one of \.ply, \.pcd, \.npz, \.parquet"),
         ("a", InvalidInputError, "must be one of"),
         ("pipe.ply", InvalidInputError, "is a device or a pipe"),
     ],

@@ -1,4 +1,4 @@
-"""The command line: `surfsig info`, `clean`, `extract`, `compare`, `paper`, `completion`.
+"""The command line: `surfsig info`, `clean`, `convert`, `extract`, `compare`, `paper`, `completion`.
 
 Each command is a file here that calls the library's public functions and prints; `run` turns everything that
 can go wrong into one line and an exit code.
@@ -15,6 +15,7 @@ import click
 from surfsig.cli.clean import clean_command
 from surfsig.cli.compare import compare_command
 from surfsig.cli.completion import completion_command
+from surfsig.cli.convert import convert_command
 from surfsig.cli.extract import extract_command
 from surfsig.cli.info import info_command
 from surfsig.cli.paper import paper_command
@@ -48,6 +49,7 @@ for command in (
     clean_command,
     extract_command,
     compare_command,
+    convert_command,
     paper_command,
     completion_command,
 ):

@@ -9,7 +9,7 @@ import click
 
 from surfsig import defaults
 from surfsig.cli.console import number, print_json, print_table
-from surfsig.cli.options import CLOUD, axes_option, json_option, position, threads_option
+from surfsig.cli.options import CLOUD, axes_option, input_options, json_option, position, threads_option
 
 if TYPE_CHECKING:
     from surfsig import PointCloud
@@ -32,12 +32,13 @@ if TYPE_CHECKING:
     type=float,
     default=defaults.RADIUS,
     show_default=True,
-    help="Of the neighbourhood, in the files' unit.",
+    help="Of the neighbourhood, in the files' unit; with --unit, in metres.",
 )
 @axes_option
 @click.option(
     "--viewpoint", type=position, metavar="X,Y,Z", help="Where the sensor stood, if the files do not say."
 )
+@input_options
 @threads_option
 @json_option
 def compare_command(
@@ -49,6 +50,7 @@ def compare_command(
     viewpoint: tuple[float, float, float] | None,
     threads: int | None,
     as_json: bool,
+    **reading: Any,
 ) -> None:
     """Compare the surface at a position in A with the surface at a position in B (which may be A).
 
@@ -73,7 +75,7 @@ def compare_command(
     clouds: dict[Path, PointCloud] = {}
     for file, spot in zip((a, b), at, strict=True):
         if file not in clouds:
-            clouds[file] = surfsig.read(file)
+            clouds[file] = surfsig.read(file, **reading)
         result = surfsig.extract(
             clouds[file], radius, axes=axes, at=[spot], viewpoint=viewpoint, threads=threads
         )

@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from surfsig.cli.console import number, on_terminal, print_json, print_table, progress_bar, quantity
-from surfsig.cli.options import CLOUD, axes_option, json_option, position, threads_option
+from surfsig.cli.options import (
+    CLOUD,
+    axes_option,
+    input_options,
+    json_option,
+    position,
+    quiet_option,
+    threads_option,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,7 +34,9 @@ QUANTILES = (0.05, 0.5, 0.95)
 
 @click.command("extract", no_args_is_help=True)
 @click.argument("file", type=CLOUD)
-@click.option("--radius", type=float, help="Of the neighbourhood, in the file's unit.")
+@click.option(
+    "--radius", type=float, help="Of the neighbourhood, in the file's unit; with --unit, in metres."
+)
 @click.option(
     "--neighbors",
     type=int,
@@ -34,7 +44,11 @@ QUANTILES = (0.05, 0.5, 0.95)
     help="In place of --radius, the K nearest points; with --radius, at most so many of those within it.",
 )
 @click.option(
-    "-o", "--output", type=CLOUD, required=True, help="A .ply, .las, .laz, .e57, .npz or .parquet file."
+    "-o",
+    "--output",
+    type=CLOUD,
+    required=True,
+    help="A .ply, .pcd, .las, .laz, .e57, .npz or .parquet file.",
 )
 @click.option("--signatures", is_flag=True, help="Write the signature of each point too (242 numbers).")
 @click.option(
@@ -55,10 +69,11 @@ QUANTILES = (0.05, 0.5, 0.95)
 @click.option(
     "--viewpoint", type=position, metavar="X,Y,Z", help="Where the sensor stood, if the file does not say."
 )
+@input_options
 @threads_option
 @json_option
 @click.option("--robust", is_flag=True, help="Leave out points that are far from the fitted surface.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress and no summary.")
+@quiet_option
 def extract_command(
     file: Path,
     radius: float | None,
@@ -74,6 +89,7 @@ def extract_command(
     as_json: bool,
     robust: bool,
     quiet: bool,
+    **reading: Any,
 ) -> None:
     """Write the points of FILE with their signed curvature, normals and quality.
 
@@ -85,6 +101,7 @@ def extract_command(
     \b
     Examples:
       surfsig extract scan.ply --radius 0.02 -o out.ply
+      surfsig extract part.ply --unit mm --radius 0.002 -o out.ply
       surfsig extract scan.pcd --radius 0.02 --signatures -o out.npz
       surfsig extract scan.ply --radius 0.02 --like 0.1,0.2,0.9 -o alike.ply
       surfsig extract scan.xyz --radius 0.02 --at 0.1,0.2,0.9 --viewpoint 0,0,0 -o one.parquet
@@ -100,7 +117,7 @@ def extract_command(
     shown = on_terminal() and not quiet
     clock = [time.perf_counter()]
     with progress_bar("reading", "bytes", shown=shown) as progress:
-        cloud = surfsig.read(file, progress=progress)
+        cloud = surfsig.read(file, progress=progress, **reading)
     clock.append(time.perf_counter())
     with progress_bar("extracting", "points", shown=shown) as progress:
         result = surfsig.extract(

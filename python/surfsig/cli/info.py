@@ -8,24 +8,26 @@ from typing import Any
 import click
 
 from surfsig.cli.console import number, on_terminal, print_json, print_table, progress_bar
-from surfsig.cli.options import CLOUD, json_option
+from surfsig.cli.options import CLOUD, input_options, json_option
 
 
 @click.command("info", no_args_is_help=True)
 @click.argument("file", type=CLOUD)
+@input_options
 @json_option
-def info_command(file: Path, as_json: bool) -> None:
+def info_command(file: Path, as_json: bool, **reading: Any) -> None:
     """Show what a point cloud FILE holds, and how dense it is.
 
     \b
     Examples:
       surfsig info scan.ply
       surfsig info scan.pcd --json | jq .spacing
+      surfsig info tile.copc.laz --box 500100,4500200,0,500110,4500210,50
     """  # noqa: D301
     from surfsig.files import format_name, read
 
     with progress_bar("reading", "bytes", shown=on_terminal()) as progress:
-        cloud = read(file, progress=progress)
+        cloud = read(file, progress=progress, **reading)
     values = {"file": str(file), "format": format_name(file), **_describe(cloud)}
     if as_json:
         print_json(values)

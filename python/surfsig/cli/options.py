@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from surfsig import defaults
+from surfsig.files.options import UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,17 +17,72 @@ if TYPE_CHECKING:
     Function = TypeVar("Function", bound="Callable[..., Any]")
 
 
+def _numbers(text: str, count: int, example: str) -> list[float]:
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != count:
+        word = {3: "three", 4: "four", 6: "six"}[count]
+        raise click.BadParameter(f"{text!r} is not {word} numbers such as {example}")
+    return values
+
+
 def position(text: str) -> tuple[float, float, float]:
     """Turn "1,2.5,-3" into three floats; the type of options that name a place."""
-    try:
-        x, y, z = (float(part) for part in text.split(","))
-    except ValueError:
-        raise click.BadParameter(f"{text!r} is not three numbers such as 0.1,-0.25,3") from None
+    x, y, z = _numbers(text, 3, "0.1,-0.25,3")
     return x, y, z
+
+
+def corners(text: str) -> list[list[float]]:
+    """Turn "0,0,0,1,2,3" into the two corners of a box, the lowest first."""
+    values = _numbers(text, 6, "-1,-1,0,1,1,2.5")
+    return [values[:3], values[3:]]
+
+
+def pinhole(text: str) -> list[float]:
+    """Turn "525,525,319.5,239.5" into the four numbers of a camera."""
+    return _numbers(text, 4, "525,525,319.5,239.5")
 
 
 # Whether the file exists and is one is found out when it is opened, with the same message as from Python.
 CLOUD = click.Path(path_type=Path)
+
+
+def input_options(command: Function) -> Function:
+    """Add what `surfsig.read` can be asked for, under the names of its keywords (`**reading` takes them)."""
+    options = (
+        click.option(
+            "--unit",
+            type=click.Choice(list(UNITS)),
+            help="The unit of the file's numbers; all else is then in metres, a radius and positions too.",
+        ),
+        click.option(
+            "--box",
+            type=corners,
+            metavar="X0,Y0,Z0,X1,Y1,Z1",
+            help="Only the points between these corners, in the file's unit.",
+        ),
+        click.option("--scan", type=int, metavar="N", help="Of an E57 file, only its scan N, from 0."),
+        click.option(
+            "--samples", type=int, metavar="N", help="Of a mesh, N points spread over it, not its vertices."
+        ),
+        click.option(
+            "--intrinsics",
+            type=pinhole,
+            metavar="FX,FY,CX,CY",
+            help="Of a depth image: the camera's focal lengths and centre, in pixels.",
+        ),
+        click.option(
+            "--depth-scale",
+            type=float,
+            metavar="S",
+            help="Of a depth image: units of its numbers per unit of length.  [default: 1000]",
+        ),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
 
 
 def axes_option(command: Function) -> Function:
@@ -45,6 +101,11 @@ def threads_option(command: Function) -> Function:
     return click.option(
         "--threads", type=int, default=None, metavar="N", help="Threads to use.  [default: all cores]"
     )(command)
+
+
+def quiet_option(command: Function) -> Function:
+    """Add --quiet."""
+    return click.option("-q", "--quiet", is_flag=True, help="No progress and no summary.")(command)
 
 
 def json_option(command: Function) -> Function:

@@ -91,7 +91,15 @@ def metadata(cloud: PointCloud, notes: Mapping[str, str]) -> dict[bytes, str]:
 
 
 def field_type(dtype: np.dtype[Any], shape: tuple[int, ...]) -> pa.DataType:
-    """Give the type of a column (n,), or (n, k) where the shape is (k,)."""
+    """Give the type of a column (n,), or (n, k) where the shape is (k,).
+
+    Raises
+    ------
+    InvalidInputError
+        If k is 0, which Arrow has no type for.
+    """
+    if shape == (0,):
+        raise InvalidInputError("Arrow and Parquet cannot hold a column (n, 0)")
     kind = pyarrow().from_numpy_dtype(dtype)
     return pyarrow().list_(kind, shape[0]) if shape else kind
 

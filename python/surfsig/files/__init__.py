@@ -152,28 +152,28 @@ def write(
     notes: Mapping[str, str] | None = None,
     progress: ProgressCallback | None = None,
 ) -> None:
-    """Write a cloud with further columns: PLY, LAS, LAZ, E57, NPZ or Parquet, by the extension.
+    """Write a cloud with further columns: PLY, PCD, LAS, LAZ, E57, NPZ or Parquet, by the extension.
 
     The file appears whole or not at all: a failure (a full disk) leaves an old file as it was.
 
     Parameters
     ----------
     path
-        The file; ``.ply``, ``.las``, ``.laz``, ``.e57``, ``.npz`` or ``.parquet``.
+        The file; ``.ply``, ``.pcd``, ``.las``, ``.laz``, ``.e57``, ``.npz`` or ``.parquet``.
     cloud
-        Its points come first (in PLY and E57 as double where float would change one of them; in LAS and LAZ
-        rounded to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields. In E57 its
+        Its points come first (in PLY, PCD and E57 as double where float would change one of them; in LAS and
+        LAZ rounded to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields. In E57 its
         viewpoint, or its viewpoints, become the poses of its scans. Or what else `PointCloud.of` takes.
     columns
         (n,) or (n, k) numbers by name. ``normals`` (n, 3) are written as nx, ny, nz and ``colors`` (n, 3 or
-        4) as red, green, blue (and alpha). Any other (n, k) column stays one in NPZ and Parquet, and becomes
-        NAME_0, NAME_1, ... in the others. A field of the cloud with the same name is kept as
-        ``input_NAME``.
+        4) as red, green, blue (and alpha); PCD packs colours of uint8 into ``rgb`` or ``rgba``. Any other
+        (n, k) column stays one in PCD, NPZ and Parquet, and becomes NAME_0, NAME_1, ... in the others. A
+        field of the cloud with the same name is kept as ``input_NAME``.
     chunks
         One more column, (n, width), given block by block so that it need not fit in memory.
     notes
-        Words about the whole file (PLY comments, a record of LAS; as JSON in Parquet's metadata, the array
-        ``notes`` of NPZ, the description of an E57 scan).
+        Words about the whole file (PLY and PCD comments, a record of LAS; as JSON in Parquet's metadata, the
+        array ``notes`` of NPZ, the description of an E57 scan).
     progress
         Called with the points written so far and their number.
 

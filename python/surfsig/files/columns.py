@@ -170,16 +170,26 @@ def scalar_columns(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any
     """Split (n, k) columns into k columns NAME_0, NAME_1, ... and make names fit for a header of words."""
     scalars: dict[str, NDArray[Any]] = {}
     for name, values in columns.items():
-        word = "_".join(name.split()) or "field"
+        word = header_word(name)
         parts = [(word, values)]
         if values.ndim == 2:
             parts = list(zip(column_names(word, values.shape[1]), values.T, strict=True))
         for part, column in parts:
-            unique, number = part, 2
-            while unique in scalars:
-                unique, number = f"{part}_{number}", number + 1
-            scalars[unique] = column
+            scalars[unique_name(part, scalars)] = column
     return scalars
+
+
+def header_word(name: str) -> str:
+    """Make a name fit for a header of words."""
+    return "_".join(name.split()) or "field"
+
+
+def unique_name(name: str, taken: Collection[str]) -> str:
+    """Give the name, with _2, _3, ... behind it if it is taken."""
+    unique, number = name, 2
+    while unique in taken:
+        unique, number = f"{name}_{number}", number + 1
+    return unique
 
 
 def column_names(name: str, width: int) -> list[str]:

@@ -15,8 +15,6 @@ from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
-MAGIC = b"\x89PNG"
-
 # Deflate makes at most 1032 bytes of one.
 _MAX_RATIO = 1032
 # Signature, then the chunk IHDR: its length and name, width, height, bits per channel, type of colour.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,21 +12,7 @@ from typing import Any, BinaryIO, Protocol
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError, InvalidInputError
-from surfsig.files import (
-    depth_image,
-    e57,
-    e57_writer,
-    kitti,
-    las,
-    las_write,
-    numpy_files,
-    obj,
-    parquet,
-    pcd,
-    ply,
-    stl,
-    text,
-)
+from surfsig.files import e57, e57_writer, kitti, numpy_files, obj, parquet, pcd, pcd_write, ply, stl, text
 from surfsig.files.columns import Chunks
 from surfsig.files.opening import Opening, Recogniser, begins, matches
 from surfsig.files.progress import Progress
@@ -64,7 +51,8 @@ class Format:
     recognise
         Tells from what can be seen of a file at once whether it has this format.
     read
-        Reads from an open file; None if the format is only recognised, to be named in a message.
+        Reads from an open file; None if the format is only recognised, to be named in a message. A name
+        (MODULE:FUNCTION) where the library behind it takes a while to import.
     write
         Writes to an open file; None if the format is not written.
     check
@@ -80,13 +68,24 @@ class Format:
     name: str
     extensions: tuple[str, ...]
     recognise: Recogniser
-    read: Reader | None = None
-    write: Writer | None = None
+    read: Reader | str | None = None
+    write: Writer | str | None = None
     check: Callable[[], None] = lambda: None
     reserved: tuple[str, ...] = ("x", "y", "z")
     takes: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
 
+
+def _function(of: Callable[..., Any] | str) -> Any:
+    """Give a function, imported now where it is named: MODULE:FUNCTION of this package."""
+    if not isinstance(of, str):
+        return of
+    module, _, name = of.partition(":")
+    return getattr(importlib.import_module(f"surfsig.files.{module}"), name)
+
+
+# Bit 7 of the point format's number says that the points are compressed.
+_LAZ = re.compile(rb"LASF.{100}[\x80-\xff]", re.DOTALL)
 
 _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
 
@@ -94,7 +93,7 @@ _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
 # because every PCD header, every OBJ file and every HTML page is text as well.
 FORMATS = (
     Format("PLY", (".ply",), matches(ply.MAGIC), ply.read, ply.write),
-    Format("PCD", (".pcd",), matches(pcd.MAGIC), pcd.read),
+    Format("PCD", (".pcd",), matches(pcd.MAGIC), pcd.read, pcd_write.write, reserved=pcd_write.RESERVED),
     Format("NPY", (".npy",), begins(numpy_files.NPY_MAGIC), numpy_files.read_npy),
     Format(
         "NPZ",
@@ -107,14 +106,14 @@ FORMATS = (
     Format(
         "Parquet", (".parquet",), begins(parquet.MAGIC), parquet.read, parquet.write, parquet.check_available
     ),
-    Format("LAZ", (".laz",), matches(las.LAZ_MAGIC), las.read, las_write.write_laz, takes=("box",)),
-    Format("LAS", (".las",), begins(las.MAGIC), las.read, las_write.write_las, takes=("box",)),
+    Format("LAZ", (".laz",), matches(_LAZ), "las:read", "las_write:write_laz", takes=("box",)),
+    Format("LAS", (".las",), begins(b"LASF"), "las:read", "las_write:write_las", takes=("box",)),
     Format("E57", (".e57",), begins(e57.MAGIC), e57.read, e57_writer.write, takes=("scan",)),
     Format(
         "PNG image",
         (".png",),
-        begins(depth_image.MAGIC),
-        depth_image.read,
+        begins(b"\x89PNG"),
+        "depth_image:read",
         takes=("intrinsics", "depth_scale"),
         needs=("intrinsics",),
     ),
@@ -150,7 +149,7 @@ def of_content(path: Path, file: BinaryIO) -> tuple[Format, Reader]:
                 raise FileFormatError(
                     f"{path}: holds {kind.name} data, which cannot be read (only {readable} can)"
                 )
-            return kind, kind.read
+            return kind, _function(kind.read)
     if by_name is not None:
         raise FileFormatError(
             f"{path}: is not a {by_name.name} file, nor any other that can be read ({readable})"
@@ -169,7 +168,7 @@ def of_output(path: Path) -> tuple[Format, Writer]:
     for kind in FORMATS:
         if kind.write is not None and path.suffix.lower() in kind.extensions:
             kind.check()
-            return kind, kind.write
+            return kind, _function(kind.write)
     known = ", ".join(
         extension for kind in FORMATS if kind.write is not None for extension in kind.extensions
     )

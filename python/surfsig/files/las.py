@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import struct
 from collections.abc import Iterator, Mapping
 from typing import Any, BinaryIO
@@ -20,9 +19,6 @@ from surfsig.files.options import inside
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
-MAGIC = b"LASF"
-# Bit 7 of the point format's number says that the points are compressed.
-LAZ_MAGIC = re.compile(MAGIC + rb".{100}[\x80-\xff]", re.DOTALL)
 # The record with what LAS has no place for.
 USER_ID, RECORD_ID = "surfsig", 1
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from surfsig.errors import FileFormatError
 from surfsig.files.columns import (
     Chunks,
-    aligned_blocks,
     cloud_from_columns,
     column_names,
     columns_of,
@@ -24,6 +23,7 @@ from surfsig.files.columns import (
 from surfsig.files.lines import take_rows
 from surfsig.files.ply_elements import Element, Property, skip_element, vertex_rows
 from surfsig.files.progress import Progress
+from surfsig.files.rows import write_rows
 from surfsig.point_cloud import PointCloud
 
 MAGIC = re.compile(rb"ply[ \t]*\r?\n")
@@ -137,12 +137,15 @@ def write(
     """Write points and columns; (n, k) columns become k properties NAME_0, NAME_1, ..."""
     points = cloud.points
     scalars = scalar_columns(columns)
-    names = ["x", "y", "z", *scalars]
-    types = ["f4" if points.dtype == np.float32 or exact_float32(points) else "f8"] * 3
-    types += [_stored_type(values) for values in scalars.values()]
+    axis = "f4" if points.dtype == np.float32 or exact_float32(points) else "f8"
+    parts = [(axis, values) for values in points.T]
+    parts += [(_stored_type(values), values) for values in scalars.values()]
+    names, types = ["x", "y", "z", *scalars], [kind for kind, _ in parts]
+    tail = None
     if chunks is not None:
+        tail = (_stored_type(np.empty(0, chunks.dtype)), chunks)
         names += column_names(chunks.name, chunks.width)
-        types += [_stored_type(np.empty(0, chunks.dtype))] * chunks.width
+        types += [tail[0]] * chunks.width
     header = ["ply", "format binary_little_endian 1.0"]
     told = dict(notes)
     if cloud.viewpoint is not None:
@@ -153,21 +156,7 @@ def write(
     header += [f"element vertex {len(cloud)}"]
     header += [f"property {_NAMES[kind]} {name}" for name, kind in zip(names, types, strict=True)]
     file.write("\n".join([*header, "end_header\n"]).encode())
-
-    dtype = np.dtype([(f"{i}", "<" + kind) for i, kind in enumerate(types)])
-    # The chunked column's numbers stand side by side at the end of a row: one copy moves them all.
-    fixed = dtype.names[: 3 + len(scalars)] if dtype.names else ()
-    sources = [*points.T, *scalars.values()]
-    for rows, block in aligned_blocks(chunks, len(cloud)):
-        packed = np.empty(rows.stop - rows.start, dtype)
-        for name, values in zip(fixed, sources, strict=True):
-            packed[name] = values[rows]
-        if block is not None:
-            width = block.shape[1] * dtype[-1].itemsize
-            tail = packed.view(np.uint8).reshape(len(packed), dtype.itemsize)[:, dtype.itemsize - width :]
-            tail[...] = np.ascontiguousarray(block, dtype[-1]).view(np.uint8).reshape(len(packed), width)
-        file.write(packed.data)
-        progress.advance(len(packed))
+    write_rows(file, parts, tail, len(cloud), progress)
 
 
 def _read_header(file: BinaryIO, source: str) -> Header:

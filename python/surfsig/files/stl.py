@@ -14,7 +14,6 @@ from surfsig.errors import FileFormatError
 from surfsig.files.lines import line_blocks, parse
 from surfsig.files.opening import Opening
 from surfsig.files.progress import Progress
-from surfsig.files.rows import read_columns
 from surfsig.files.triangles import merged, normal_fields, sampled, vertex_normals
 from surfsig.point_cloud import PointCloud
 
@@ -69,7 +68,9 @@ def _read_binary(file: BinaryIO, source: str, progress: Progress) -> NDArray[Any
         raise FileFormatError(
             f"{source}: cut off: {count} triangles need {_size(count)} bytes, the file has {size}"
         )
-    return read_columns(file, _TRIANGLE, count, source, progress)["corners"].reshape(-1, 3)
+    rows = np.frombuffer(file.read(count * _TRIANGLE.itemsize), _TRIANGLE)
+    progress.advance(size)
+    return rows["corners"].reshape(-1, 3)
 
 
 def _read_ascii(file: BinaryIO, source: str, progress: Progress) -> NDArray[Any]:
