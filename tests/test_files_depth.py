@@ -1,9 +1,12 @@
 """Depth images against the pinhole camera's formula and Open3D; images that are none."""
 
 import io
+import json
 import struct
 import tracemalloc
+import warnings
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -151,3 +154,35 @@ def test_a_chunk_that_claims_gigabytes_allocates_none(tmp_path: Path) -> None:
         assert tracemalloc.get_traced_memory()[1] < 20e6
     finally:
         tracemalloc.stop()
+
+
+def test_an_image_of_many_short_rows(tmp_path: Path) -> None:
+    image = np.full((200_000, 1), 7, np.uint16)
+    points = read(saved(tmp_path, png(image)), intrinsics=(1, 1, 0, 0)).points
+    expected = np.column_stack([np.zeros(200_000), np.arange(200_000) * 0.007, np.full(200_000, 0.007)])
+    np.testing.assert_allclose(points, expected, rtol=1e-7)
+
+
+def test_what_pillow_warns_of_is_no_matter(tmp_path: Path) -> None:
+    # An animation without pictures.
+    chunk = b"acTL" + bytes(8)
+    extra = struct.pack(">I", 8) + chunk + struct.pack(">I", zlib.crc32(chunk))
+    whole = png(depths())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cloud = read(saved(tmp_path, whole[:33] + extra + whole[33:]), intrinsics=CAMERA)
+    assert cloud.grid == (40, 64)
+
+
+def test_from_the_shell(shell: Callable[..., Any], tmp_path: Path) -> None:
+    path = saved(tmp_path, png(depths()))
+    asked = shell("info", path)
+    assert asked.code == 2
+    assert "--intrinsics fx,fy,cx,cy" in asked.err
+    camera = ("--intrinsics", "525,520,31.5,20.25", "--depth-scale", 5000)
+    assert shell("convert", path, tmp_path / "a.ply", *camera).code == 0
+    cloud = read(tmp_path / "a.ply")
+    assert cloud.grid == (40, 64)
+    np.testing.assert_array_equal(cloud.points, read(path, intrinsics=CAMERA, depth_scale=5000).points)
+    values = json.loads(shell("info", path, *camera, "--json").out)
+    assert (values["format"], values["grid"], values["viewpoint"]) == ("PNG image", [40, 64], [0, 0, 0])

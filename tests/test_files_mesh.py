@@ -2,6 +2,7 @@
 
 import struct
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -234,8 +235,8 @@ def test_a_table_called_obj_or_stl_is_text(tmp_path: Path) -> None:
         ("a.obj", "v 0 0 0\nf 0 1 1\n", "line 2: a face has the corner 0"),
         ("a.obj", "v 0 0 0\nf -2 1 1\n", "line 2: a face has the corner 0"),
         ("a.obj", "v 0 0 0\nf 1 1\n", "line 2: a face needs three corners"),
-        ("a.obj", "v 0 0 0\nf 1 1 x\n", "line 2: 'x' is no corner of a face"),
-        ("a.obj", "v 0 0 0\nf 1 1 99999999999999999999\n", "is no corner of a face"),
+        ("a.obj", "v 0 0 0\nf 1 1 x\n", "line 2: '1 1 x' is no face"),
+        ("a.obj", "v 0 0 0\nf 1 1 99999999999999999999\n", "is no face"),
         ("a.obj", "# nothing\n", "holds no points"),
         ("a.obj", "vn 0 0 1\nf 1 2 3\n", "holds no points"),
         ("a.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 x\n", "line 4: 'x' is not a number"),
@@ -293,3 +294,30 @@ def test_signalling_nans_warn_of_nothing(tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert np.isnan(read(saved(tmp_path, "a.stl", bytes(content))).points).sum() == 1
+
+
+def test_from_the_shell(shell: Callable[..., Any], tmp_path: Path) -> None:
+    vertices, faces = sphere(20)
+    path = saved(tmp_path, "part.stl", binary_stl(vertices, faces))
+    out = tmp_path / "a.ply"
+    assert shell("convert", path, out, "--samples", 30_000, "--unit", "mm").code == 0
+    cloud = read(out)
+    np.testing.assert_array_equal(cloud.points, read(path, samples=30_000, unit="mm").points)
+    assert list(cloud.fields) == ["nx", "ny", "nz"]
+    # In metres: a ball of 0.02, seen from outside its top, and so of curvature 50.
+    words = (
+        "--samples",
+        30_000,
+        "--unit",
+        "mm",
+        "--radius",
+        0.004,
+        "--viewpoint",
+        "0,0,1",
+        "--at",
+        "0,0.0119,0.016",
+    )
+    assert shell("extract", path, *words, "-o", out).code == 0
+    fields = read(out).fields
+    assert fields["k1"] == pytest.approx(50, rel=0.06)
+    assert fields["k2"] == pytest.approx(50, rel=0.06)

@@ -29,6 +29,7 @@ _HEADER = np.dtype(
     ]
 )
 _GREY = 0
+_BLOCK = 1 << 16
 
 
 def check_available() -> None:
@@ -66,13 +67,16 @@ def read(
     depths = _decoded(file, source)
     progress.advance(size)
     height, width = depths.shape
-    points = np.empty((height, width, 3), np.float32)
-    for row, line in enumerate(depths):
-        z = np.where(line == 0, np.nan, line / scale)
-        points[row, :, 0] = (np.arange(width) - cx) * z / fx
-        points[row, :, 1] = (row - cy) * z / fy
-        points[row, :, 2] = z
-    return PointCloud(points.reshape(-1, 3), viewpoint=np.zeros(3), grid=(height, width))
+    values = depths.ravel()
+    points = np.empty((values.size, 3), np.float32)
+    # Pixels by blocks, as a broken image may be all height or all width.
+    for start in range(0, values.size, _BLOCK):
+        block = values[start : start + _BLOCK]
+        v, u = np.divmod(np.arange(start, start + len(block)), width)
+        z = np.where(block == 0, np.nan, block / scale)
+        rows = points[start : start + _BLOCK]
+        rows[:, 0], rows[:, 1], rows[:, 2] = (u - cx) * z / fx, (v - cy) * z / fy, z
+    return PointCloud(points, viewpoint=np.zeros(3), grid=(height, width))
 
 
 def _check_header(head: bytes, size: int, source: str) -> None:
@@ -127,8 +131,8 @@ def _decoded(file: BinaryIO, source: str) -> NDArray[Any]:
     content = io.BytesIO(file.read())
     try:
         with warnings.catch_warnings():
-            # Pillow warns of sizes that the file's own has justified.
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            # Of sizes that the file's own has justified, and of extras that do not touch the depths.
+            warnings.simplefilter("ignore")
             with Image.open(content, formats=["PNG"]) as image:
                 return np.asarray(image)
     # Besides OSError, a broken chunk raises whatever Pillow's parser of it may raise.

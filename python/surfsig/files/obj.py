@@ -109,7 +109,7 @@ def _take(contents: _Contents, block: Block, source: str) -> None:
                 normals[i] = rest[0] if rest else keyword
                 contents.normal_count += 1
             case "f":
-                _take_face(contents, rest[0].split() if rest else [], block.first + i, source)
+                _take_face(contents, rest[0] if rest else "", block.first + i, source)
             case word if word and word not in _KEYWORDS:
                 text = line.strip()[:40]
                 raise FileFormatError(
@@ -120,26 +120,30 @@ def _take(contents: _Contents, block: Block, source: str) -> None:
     contents.normals.append(parse(normals, np.float64, 3, source=source, first=block.first))
 
 
-def _take_face(contents: _Contents, tokens: list[str], number: int, source: str) -> None:
+def _take_face(contents: _Contents, text: str, number: int, source: str) -> None:
     """Add a face: each corner is VERTEX, VERTEX/TEXTURE, VERTEX//NORMAL or VERTEX/TEXTURE/NORMAL."""
     try:
-        for token in tokens:
-            vertex, _, others = token.partition("/")
-            contents.corners.append(_absolute(int(vertex), contents.vertex_count))
-            normal = others.partition("/")[2]
-            if normal:
-                contents.corner_normals.append(_absolute(int(normal), contents.normal_count))
+        if "/" in text:
+            parts = [token.split("/") for token in text.split()]
+            corners = [int(part[0]) for part in parts]
+            normals = [int(part[2]) for part in parts if len(part) > 2]
+        else:
+            corners, normals = [int(token) for token in text.split()], []
+        contents.corners.extend(_absolute(corners, contents.vertex_count))
+        contents.corner_normals.extend(_absolute(normals, contents.normal_count))
     except (ValueError, OverflowError):
-        raise FileFormatError(f"{source}: line {number}: {token[:40]!r} is no corner of a face") from None
-    if len(tokens) < 3:
+        raise FileFormatError(f"{source}: line {number}: {text.strip()[:40]!r} is no face") from None
+    if len(corners) < 3:
         raise FileFormatError(f"{source}: line {number}: a face needs three corners")
-    contents.face_sizes.append(len(tokens))
+    contents.face_sizes.append(len(corners))
     contents.face_lines.append(number)
 
 
-def _absolute(index: int, count: int) -> int:
-    """Resolve a negative number, which counts back from the last vertex so far."""
-    return index if index >= 0 else count + 1 + index
+def _absolute(indices: list[int], count: int) -> list[int]:
+    """Resolve negative numbers, which count back from the last one so far."""
+    if min(indices, default=0) >= 0:
+        return indices
+    return [index if index >= 0 else count + 1 + index for index in indices]
 
 
 def _checked(contents: _Contents, source: str) -> NDArray[np.intp]:
