@@ -83,36 +83,47 @@ impl<'a> DirectWalk<'a> {
     /// Shows a visitor the members of the ball around the query at this offset.
     pub fn visit<V: BallVisitor>(&mut self, offset: [f32; 3], visitor: &mut V) {
         let CellIndex { x, y, z, lattice, .. } = self.index;
-        let rows = Rows { x, y, z };
-        let scale = f64::from(self.scale);
-        let ball = Ball {
-            query: offset.map(|o| f64::from(o) * scale),
-            scale: self.scale,
-            half_step: (lattice.half_step() * scale) as f32,
-        };
-        let mut place = Place::default();
-        self.block.len = 0;
-        loop {
-            let finished = if V::WANTS_RANKS {
-                gather::<true>(self.set, rows, &self.windows, ball, &mut self.block, &mut place)
-            } else {
-                gather::<false>(self.set, rows, &self.windows, ball, &mut self.block, &mut place)
-            };
-            while self.block.len >= BLOCK {
-                visitor.visit(&self.block, BLOCK);
-                self.block.carry_over();
-            }
-            if finished {
-                break;
-            }
-        }
-        let len = self.block.len;
-        let padding = len..len.next_multiple_of(PADDING);
-        self.block.x[padding.clone()].fill(0.0);
-        self.block.y[padding.clone()].fill(0.0);
-        self.block.z[padding].fill(0.0);
-        visitor.visit(&self.block, len);
+        let ball = Ball::around(offset, self.scale, lattice);
+        visit_members(self.set, Rows { x, y, z }, &self.windows, ball, &mut self.block, visitor);
     }
+}
+
+/// Shows a visitor those points of the windows that are in the ball.
+pub(crate) fn visit_members<V: BallVisitor>(
+    set: InstructionSet,
+    rows: Rows<'_>,
+    windows: &[Window],
+    ball: Ball,
+    block: &mut Block,
+    visitor: &mut V,
+) {
+    let mut place = Place::default();
+    block.len = 0;
+    loop {
+        let finished = if V::WANTS_RANKS {
+            gather::<true>(set, rows, windows, ball, block, &mut place)
+        } else {
+            gather::<false>(set, rows, windows, ball, block, &mut place)
+        };
+        while block.len >= BLOCK {
+            visitor.visit(block, BLOCK);
+            block.carry_over();
+        }
+        if finished {
+            break;
+        }
+    }
+    finish(block, visitor);
+}
+
+/// Shows a visitor what is left in a block.
+pub(crate) fn finish<V: BallVisitor>(block: &mut Block, visitor: &mut V) {
+    let len = block.len;
+    let padding = len..len.next_multiple_of(PADDING);
+    block.x[padding.clone()].fill(0.0);
+    block.y[padding.clone()].fill(0.0);
+    block.z[padding].fill(0.0);
+    visitor.visit(block, len);
 }
 
 impl MomentSource for DirectWalk<'_> {

@@ -166,6 +166,27 @@ pub(crate) struct Principal {
     pub direction: Vector,
 }
 
+impl Principal {
+    /// Eigen-decomposition of the shape operator s11, s12, s22 in an orthonormal basis of the tangent plane.
+    #[inline(always)]
+    pub fn of_shape_operator([s11, s12, s22]: [Lanes; 3], t1: &Vector, t2: &Vector, normal: Vector) -> Self {
+        let half = Lanes::splat(0.5);
+        let mean = half * (s11 + s22);
+        let difference = half * (s11 - s22);
+        let spread = difference.mul_add(difference, s12 * s12).sqrt();
+        // Half the angle of (difference, s12), by the formula that does not cancel.
+        let tiny = Lanes::splat(1e-300);
+        let long = ((spread + difference.abs() + tiny) / (spread + spread + tiny)).sqrt().min(Lanes::ONE);
+        let short = s12 / ((spread + spread) * long + tiny);
+        let along_first = Lanes::ZERO.le(difference);
+        let downward = s12.lt(Lanes::ZERO);
+        let cosine = along_first.select(long, short.abs());
+        let sine = along_first.select(short, downward.select(-long, long));
+        let direction = add_scaled(&[cosine * t1[0], cosine * t1[1], cosine * t1[2]], sine, t2);
+        Self { k1: mean + spread, k2: mean - spread, normal, direction }
+    }
+}
+
 /// Principal curvatures of a, b, c, d, e, f over the given axes, at the centre.
 ///
 /// The shape operator in an orthonormal basis of the tangent plane, rather than H and K: at
@@ -195,19 +216,5 @@ pub(crate) fn principal_curvatures(
         * (metric_uu * metric_uu * fvv - (metric_uu + metric_uu) * metric_uv * fuv
             + metric_uv * metric_uv * fuu)
         / (metric_uu * determinant * root);
-    let half = Lanes::splat(0.5);
-    let mean = half * (s11 + s22);
-    let difference = half * (s11 - s22);
-    let spread = difference.mul_add(difference, s12 * s12).sqrt();
-    // Half the angle of (difference, s12), by the formula that does not cancel.
-    let tiny = Lanes::splat(1e-300);
-    let long = ((spread + difference.abs() + tiny) / (spread + spread + tiny)).sqrt().min(Lanes::ONE);
-    let short = s12 / ((spread + spread) * long + tiny);
-    let along_first = Lanes::ZERO.le(difference);
-    let downward = s12.lt(Lanes::ZERO);
-    let cosine = along_first.select(long, short.abs());
-    let sine = along_first.select(short, downward.select(-long, long));
-    let direction = add_scaled(&[cosine * t1[0], cosine * t1[1], cosine * t1[2]], sine, &t2);
-    let normal = inverted(&upward, away_from_sensor);
-    Principal { k1: mean + spread, k2: mean - spread, normal, direction }
+    Principal::of_shape_operator([s11, s12, s22], &t1, &t2, inverted(&upward, away_from_sensor))
 }

@@ -27,6 +27,7 @@
 //!
 //! The way of the data, room by room: [`PointCloud`] -> [`CellIndex`] -> [`Moments`] -> paraboloid
 //! ([`FitAxes`]) -> curvature ([`Paraboloid`]) -> [`Frame`] -> [`similarity`]; [`extract()`] walks it.
+//! [`fit_sphere`], [`fit_cylinder`] and [`fit_quadric`] read other surfaces off the same moments.
 
 mod ball;
 mod block_sums;
@@ -36,6 +37,7 @@ mod error;
 mod extract;
 mod fit;
 mod frame;
+mod hierarchy;
 mod members;
 mod moments;
 mod point_cloud;
@@ -50,7 +52,7 @@ pub use extract::{
     ExtractOptions, Extraction, Monitor, Neighborhood, Queries, Status, extract, extract_monitored,
     voxel_representatives,
 };
-pub use fit::FitAxes;
+pub use fit::{Cylinder, FitAxes, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere};
 pub use frame::{Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use point_cloud::{Offsets, PointCloud, Radius};

@@ -11,7 +11,10 @@ const CELLS_PER_RADIUS: f64 = 2.0;
 
 /// Cells along a row before the next row begins. Offsets are float32 from the middle of the row, so
 /// this bounds their rounding: 24 cells are 12 radii, which is 5e-7 of a radius.
-const CELLS_PER_ROW: f64 = 48.0;
+pub(crate) const CELLS_PER_ROW: i64 = 48;
+
+/// Parts into which the hierarchy may cut a cell along each axis.
+pub(crate) const PARTS_PER_CELL: i32 = 64;
 
 /// Float64 can still tell neighbouring cells apart, with a thousandth of a cell to spare.
 const MAX_CELLS: f64 = (1_u64 << 43) as f64;
@@ -35,7 +38,7 @@ pub(crate) struct Lattice {
 impl Lattice {
     pub fn new(radius: Radius) -> Self {
         let step = radius.get() / CELLS_PER_RADIUS;
-        Self { radius: radius.get(), step, row_length: step * CELLS_PER_ROW }
+        Self { radius: radius.get(), step, row_length: step * CELLS_PER_ROW as f64 }
     }
 
     /// The row of a position, and its offset from the row's middle.
@@ -73,6 +76,35 @@ impl Lattice {
             (to.y - from.y) as f64 * self.step,
             (to.z - from.z) as f64 * self.step,
         ]
+    }
+
+    /// From a corner of cells, numbered along x, y, z, to the middle of a row: exact likewise.
+    pub fn from_corner(&self, [x, y, z]: [i64; 3], row: RowKey) -> [f64; 3] {
+        let cells = |twice: i64| twice as f64 * self.half_step();
+        [
+            cells((2 * row.x + 1) * CELLS_PER_ROW - 2 * x),
+            cells(2 * (row.y - y) + 1),
+            cells(2 * (row.z - z) + 1),
+        ]
+    }
+
+    /// Which part of its row a point at this offset from the row's middle is in: cells are cut into
+    /// [`PARTS_PER_CELL`] along each axis. An offset that was rounded out of its row counts as its edge.
+    #[inline]
+    pub fn part(&self, offset: [f32; 3]) -> [i32; 3] {
+        let parts_per_length = f64::from(PARTS_PER_CELL) / self.step;
+        let place = |offset: f32, parts: i32| {
+            let part = (f64::from(offset) * parts_per_length + f64::from(parts / 2)) as i32;
+            part.clamp(0, parts - 1)
+        };
+        let along = CELLS_PER_ROW as i32 * PARTS_PER_CELL;
+        [place(offset[0], along), place(offset[1], PARTS_PER_CELL), place(offset[2], PARTS_PER_CELL)]
+    }
+
+    /// Which of its row's cells a point is in.
+    #[inline]
+    pub fn cell(&self, x: f32) -> i32 {
+        self.part([x, 0.0, 0.0])[0] / PARTS_PER_CELL
     }
 
     /// Half the size of a row along y and z.

@@ -2,7 +2,7 @@
 
 mod lattice;
 
-pub(crate) use lattice::{Lattice, RowKey};
+pub(crate) use lattice::{CELLS_PER_ROW, Lattice, PARTS_PER_CELL, RowKey};
 
 use crate::simd::select::PADDING;
 use crate::{Error, Monitor, PointCloud, Radius};

@@ -209,69 +209,42 @@ impl Columns {
         }
     }
 
-    /// The columns cut into parts of `len` entries, the last of which may be shorter.
-    pub fn parts(&mut self, len: usize) -> Vec<ColumnsPart<'_>> {
-        let mut coefficients = self.coefficients.chunks_mut(len);
-        let mut radii = self.radii.chunks_mut(len);
-        let mut scalars = [
-            &mut self.k1,
-            &mut self.k2,
-            &mut self.residual,
-            &mut self.condition,
-            &mut self.mean_curvature_std,
-            &mut self.k1_std,
-            &mut self.k2_std,
-            &mut self.linearity,
-            &mut self.planarity,
-            &mut self.scattering,
-        ]
-        .map(|column| column.chunks_mut(len));
-        let vectors = self.normals.chunks_mut(len).zip(self.directions.chunks_mut(len));
-        let numbers = self.count.chunks_mut(len).zip(self.status.chunks_mut(len));
-        vectors
-            .zip(numbers)
-            .map(|((normals, directions), (count, status))| {
-                let [
-                    k1,
-                    k2,
-                    residual,
-                    condition,
-                    mean_curvature_std,
-                    k1_std,
-                    k2_std,
-                    linearity,
-                    planarity,
-                    scattering,
-                ] = scalars.each_mut().map(|column| column.next().expect("columns of one length"));
-                ColumnsPart {
-                    radius: self.radius,
-                    radii: radii.next().unwrap_or_default(),
-                    k1,
-                    k2,
-                    normals,
-                    directions,
-                    residual,
-                    condition,
-                    mean_curvature_std,
-                    k1_std,
-                    k2_std,
-                    count,
-                    status,
-                    linearity,
-                    planarity,
-                    scattering,
-                    coefficients: coefficients.next().unwrap_or_default(),
-                }
-            })
-            .collect()
+    /// The columns cut into parts of these lengths.
+    pub fn parts(&mut self, lengths: impl Iterator<Item = usize>) -> Vec<ColumnsPart<'_>> {
+        let mut rest = ColumnsPart {
+            radius: self.radius,
+            radii: &mut self.radii,
+            k1: &mut self.k1,
+            k2: &mut self.k2,
+            normals: &mut self.normals,
+            directions: &mut self.directions,
+            residual: &mut self.residual,
+            condition: &mut self.condition,
+            mean_curvature_std: &mut self.mean_curvature_std,
+            k1_std: &mut self.k1_std,
+            k2_std: &mut self.k2_std,
+            count: &mut self.count,
+            status: &mut self.status,
+            linearity: &mut self.linearity,
+            planarity: &mut self.planarity,
+            scattering: &mut self.scattering,
+            coefficients: &mut self.coefficients,
+        };
+        lengths.map(|len| rest.split_off(len)).collect()
     }
 
     /// The entries in the order of the queries. `query_of_entry` names each entry's query; queries
     /// without an entry are those of points that are not finite.
-    pub fn finish(self, queries: usize, query_of_entry: &[u32], axes: FitAxes, oriented: bool) -> Extraction {
+    pub fn finish(
+        self,
+        queries: usize,
+        query_of_entry: impl Iterator<Item = u32>,
+        axes: FitAxes,
+        oriented: bool,
+    ) -> Extraction {
         const NOWHERE: u32 = u32::MAX;
         let mut entries = vec![NOWHERE; queries];
-        for (entry, &query) in query_of_entry.iter().enumerate() {
+        for (entry, query) in query_of_entry.enumerate() {
             entries[query as usize] = entry as u32;
         }
         // One column after the other, so that hardly more than one is there twice.
@@ -311,6 +284,33 @@ impl Columns {
 }
 
 impl ColumnsPart<'_> {
+    /// Takes the first entries away, and returns them.
+    fn split_off(&mut self, len: usize) -> Self {
+        /// Of columns that are not wanted there are none.
+        fn first<'a, T>(column: &mut &'a mut [T], len: usize) -> &'a mut [T] {
+            column.split_off_mut(..len).unwrap_or_default()
+        }
+        Self {
+            radius: self.radius,
+            radii: first(&mut self.radii, len),
+            k1: first(&mut self.k1, len),
+            k2: first(&mut self.k2, len),
+            normals: first(&mut self.normals, len),
+            directions: first(&mut self.directions, len),
+            residual: first(&mut self.residual, len),
+            condition: first(&mut self.condition, len),
+            mean_curvature_std: first(&mut self.mean_curvature_std, len),
+            k1_std: first(&mut self.k1_std, len),
+            k2_std: first(&mut self.k2_std, len),
+            count: first(&mut self.count, len),
+            status: first(&mut self.status, len),
+            linearity: first(&mut self.linearity, len),
+            planarity: first(&mut self.planarity, len),
+            scattering: first(&mut self.scattering, len),
+            coefficients: first(&mut self.coefficients, len),
+        }
+    }
+
     /// Number of entries.
     pub fn len(&self) -> usize {
         self.k1.len()

@@ -4,7 +4,9 @@ mod extraction;
 mod monitor;
 mod neighborhood;
 mod queries;
+mod region;
 mod robust;
+mod shares;
 mod status;
 
 pub use extraction::Extraction;
@@ -18,6 +20,7 @@ use crate::cell_index::{CellIndex, Row, RowKey};
 use crate::fit::FitAxes;
 use crate::fit::paraboloid::{Paraboloids, Task, fit_paraboloids};
 use crate::fit::tensor::MomentBatch;
+use crate::hierarchy::HierarchicalWalk;
 use crate::members::Members;
 use crate::moments::{Moments, Scalar};
 use crate::simd::InstructionSet;
@@ -28,10 +31,8 @@ use extraction::{Columns, ColumnsPart};
 use neighborhood::first_radius;
 use rayon::prelude::*;
 use robust::without_outliers;
+use shares::{Share, shares};
 use std::ops::Range;
-
-/// Queries that one thread takes at a time.
-const CHUNK: usize = 512;
 
 /// Most queries that share their windows.
 const RUN: usize = 32;
@@ -172,23 +173,27 @@ fn run(
     let own_radii = !matches!(neighborhood, Neighborhood::Ball(_));
     let mut columns = Columns::new(asked.len(), radius.get(), own_radii, options.axes);
     let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
-    let parts = columns.parts(CHUNK);
-    parts.into_par_iter().enumerate().try_for_each_init(
+    let hierarchy = matches!(neighborhood, Neighborhood::Ball(_)) && !options.robust && std::env::var_os("SURFSIG_DIRECT").is_none();
+    let shares = shares(&index, asked, hierarchy);
+    let parts = columns.parts(shares.iter().map(Share::len));
+    // One by one, since some are large.
+    shares.iter().zip(parts).par_bridge().try_for_each_init(
         || Worker::new(&index, asked, neighborhood, options, set),
-        |worker, (chunk, mut part)| {
-            worker.extract(chunk * CHUNK, &mut part, monitor)?;
-            monitor.add(part.len());
-            Ok(())
+        |worker, (share, mut part)| match share {
+            Share::Direct(runs) => worker.extract(runs, &mut part, monitor),
+            Share::Region { corner, cells } => worker.extract_region(*corner, cells, &mut part, monitor),
         },
     )?;
     let oriented = options.viewpoint.is_some() || options.directions.is_some();
-    let found = columns.finish(queries.len(cloud), &asked.point_of_rank, options.axes, oriented);
+    let query_of_entry = shares.iter().flat_map(Share::ranks).map(|rank| asked.point_of_rank[rank]);
+    let found = columns.finish(queries.len(cloud), query_of_entry, options.axes, oriented);
     Ok((found, index))
 }
 
 /// One thread's share of the loop: gathers moments until a batch is full, fits it, writes it.
 struct Worker<'a> {
     walk: DirectWalk<'a>,
+    hierarchical: HierarchicalWalk<'a>,
     asked: &'a CellIndex,
     neighborhood: Neighborhood,
     options: &'a ExtractOptions<'a>,
@@ -205,6 +210,8 @@ struct Worker<'a> {
 struct Pending {
     key: RowKey,
     offset: [f32; 3],
+    /// Where the hierarchical walk keeps what it shares with other queries.
+    leaf: Option<usize>,
     /// Where its values belong in the thread's part of the columns.
     entry: usize,
     /// Its number among the queries.
@@ -221,39 +228,50 @@ impl<'a> Worker<'a> {
         options: &'a ExtractOptions<'a>,
         set: InstructionSet,
     ) -> Self {
-        let walk = DirectWalk::new(index, set);
+        let (walk, hierarchical) = (DirectWalk::new(index, set), HierarchicalWalk::new(index, set));
         let (pending, moments) = (Vec::with_capacity(LANES), Vec::with_capacity(LANES));
         let members = (0..LANES).map(|_| Members::new()).collect();
-        Self { walk, asked, neighborhood, options, set, pending, moments, members, distances: Vec::new() }
+        let distances = Vec::new();
+        Self { walk, hierarchical, asked, neighborhood, options, set, pending, moments, members, distances }
     }
 
-    /// Fills a part of the columns, whose first entry is the query of rank `first`.
-    fn extract(&mut self, first: usize, part: &mut ColumnsPart<'_>, monitor: &Monitor) -> Result<(), Error> {
+    /// Fills a part of the columns with the queries of these runs of ranks, one after the other.
+    fn extract(
+        &mut self,
+        runs: &[Range<usize>],
+        part: &mut ColumnsPart<'_>,
+        monitor: &Monitor,
+    ) -> Result<(), Error> {
         let rows = &self.asked.rows;
-        let ranks = first..first + part.len();
-        let mut rank = first;
-        let mut row = rows.partition_point(|row| row.end <= rank);
-        while rank < ranks.end {
-            let Row { key, end, .. } = rows[row];
-            self.walk.enter_row(key);
-            let end = end.min(ranks.end);
-            while rank < end {
-                monitor.check()?;
-                rank = self.extract_run(key, rank..end, first, part);
+        let mut entry = 0;
+        for ranks in runs {
+            let mut rank = ranks.start;
+            let mut row = rows.partition_point(|row| row.end <= rank);
+            while rank < ranks.end {
+                let Row { key, end, .. } = rows[row];
+                self.walk.enter_row(key);
+                let end = end.min(ranks.end);
+                while rank < end {
+                    monitor.check()?;
+                    let next = self.extract_run(key, rank..end, entry, part);
+                    entry += next - rank;
+                    rank = next;
+                }
+                row += 1;
             }
-            row += 1;
         }
         self.fit_pending(part);
+        monitor.add(part.len());
         Ok(())
     }
 
     /// Takes those of the first queries in `ranks` that are close enough together to share their
-    /// windows, and returns where the next run begins.
+    /// windows, and returns where the next run begins. Their first belongs at `entry`.
     fn extract_run(
         &mut self,
         key: RowKey,
         ranks: Range<usize>,
-        first: usize,
+        entry: usize,
         part: &mut ColumnsPart<'_>,
     ) -> usize {
         let CellIndex { x, y, z, lattice, .. } = self.asked;
@@ -273,7 +291,8 @@ impl<'a> Worker<'a> {
             let offset = [x[rank], y[rank], z[rank]];
             let (moments, radius) = self.around::<f32>(offset, self.pending.len());
             let query = self.asked.point_of_rank[rank];
-            self.pending.push(Pending { key, offset, entry: rank - first, query, radius });
+            let entry = entry + rank - start;
+            self.pending.push(Pending { key, offset, leaf: None, entry, query, radius });
             self.moments.push(moments);
             if self.pending.len() == LANES && self.fit_pending(part) {
                 // The walk went back to points of the batch.
@@ -307,10 +326,15 @@ impl<'a> Worker<'a> {
         let mut fits = self.fit();
         let again: Vec<usize> = (0..self.pending.len()).filter(|&lane| fits.needs_f64.get(lane)).collect();
         for &lane in &again {
-            let Pending { key, offset, .. } = self.pending[lane];
-            self.walk.enter_row(key);
-            self.walk.enter_run(offset, offset);
-            self.moments[lane] = self.around::<f64>(offset, lane).0;
+            let Pending { key, offset, leaf, .. } = self.pending[lane];
+            self.moments[lane] = match leaf {
+                Some(leaf) => self.hierarchical.moments::<f64>(leaf, offset),
+                None => {
+                    self.walk.enter_row(key);
+                    self.walk.enter_run(offset, offset);
+                    self.around::<f64>(offset, lane).0
+                }
+            };
         }
         if !again.is_empty() {
             fits = self.fit();

@@ -77,7 +77,7 @@ fn rotate<const P: usize, const Q: usize, const K: usize>(
 
 /// Cosine, sine and tangent of the smaller angle that takes the coupling `off` of two axes away.
 #[inline(always)]
-fn rotation(p: Lanes, q: Lanes, off: Lanes, active: Mask) -> (Lanes, Lanes, Lanes) {
+pub(super) fn rotation(p: Lanes, q: Lanes, off: Lanes, active: Mask) -> (Lanes, Lanes, Lanes) {
     // Keeps 0 / 0 away where there is nothing to turn.
     let tiny = Lanes::splat(1e-300);
     let difference = q - p;

@@ -1,8 +1,19 @@
 //! Surfaces read off moments.
 
 mod covariance;
+mod cylinder;
+mod eigen;
+mod implicit;
 pub(crate) mod paraboloid;
+pub(crate) mod quadric;
+#[cfg(test)]
+mod samples;
 mod shape_error;
+mod sphere;
+mod taubin;
 pub(crate) mod tensor;
 
+pub use cylinder::{Cylinder, fit_cylinder};
+pub use implicit::{Quadric, SurfacePoint, fit_quadric};
 pub use paraboloid::FitAxes;
+pub use sphere::{Sphere, fit_sphere};

@@ -164,7 +164,7 @@ fn fit(task: &Task<'_>) -> Paraboloids {
 impl Task<'_> {
     /// Towards the sensor, from what is known of it, for surfaces with these normals.
     #[inline(always)]
-    fn towards_sensor(&self, normal: &Vector) -> Vector {
+    pub(super) fn towards_sensor(&self, normal: &Vector) -> Vector {
         match (self.to_sensor, self.axes) {
             (Some(to_sensor), _) => {
                 // A direction of no length: nobody knows, and the answer is at least always the same.

@@ -96,23 +96,35 @@ impl MomentBatch {
         self.sums[first..first + N].try_into().expect("a slice of that length")
     }
 
+    /// The mean of the monomial that stands in a slot.
+    #[inline(always)]
+    pub fn monomial(&self, slot: usize) -> Lanes {
+        self.sums[slot]
+    }
+
     #[inline(always)]
     pub fn mean(&self) -> &Vector {
         self.order::<3>(1)
+    }
+
+    /// xx, xy, xz, yy, yz, zz about the origin.
+    #[inline(always)]
+    pub fn second(&self) -> &[Lanes; 6] {
+        self.order::<6>(4)
     }
 
     /// xx, xy, xz, yy, yz, zz about the mean.
     #[inline(always)]
     pub fn covariance(&self) -> [Lanes; 6] {
         let [x, y, z] = *self.mean();
-        let m = self.order::<6>(4);
+        let m = self.second();
         [m[0] - x * x, m[1] - x * y, m[2] - x * z, m[3] - y * y, m[4] - y * z, m[5] - z * z]
     }
 
     #[inline(always)]
     pub fn along(&self, axes: &Axes) -> PatchMoments {
         let Axes { u, v, w } = axes;
-        let (first, second) = (self.mean(), self.order::<6>(4));
+        let (first, second) = (self.mean(), self.second());
         let (third, fourth) = (self.order::<10>(10), self.order::<15>(20));
         let (second_u, second_v, second_w) =
             (contract::<6, 3>(second, u), contract::<6, 3>(second, v), contract::<6, 3>(second, w));

@@ -136,7 +136,13 @@ impl<S: Scalar> Moments<S> {
     /// assert_eq!(m.get(3, 0, 0), 8.0);
     /// ```
     pub fn shifted(&self, translation: [f64; 3]) -> Self {
-        self.transformed(&IDENTITY, translation)
+        let mut sums = self.sums.map(S::to_f64);
+        for (axis, t) in translation.into_iter().enumerate() {
+            for (raised, lower) in SHIFT_STEPS[axis] {
+                sums[raised] += t * sums[lower];
+            }
+        }
+        Self { sums: sums.map(S::from_f64) }
     }
 
     /// The moments of the points R p; the rows of R are the new axes.
@@ -168,7 +174,36 @@ impl<S: Scalar> Moments<S> {
     }
 }
 
-const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// A shift along one axis as Pascal's triangle makes it: to each sum in turn, t times the one with a factor
+/// less is added, first for all exponents down to 1, then down to 2, and so on.
+const SHIFT_STEPS: [[(usize, usize); MOMENTS]; 3] = {
+    let mut steps = [[(0, 0); MOMENTS]; 3];
+    let mut axis = 0;
+    while axis < 3 {
+        let (mut step, mut last) = (0, 1);
+        while last <= 4 {
+            let mut exponent = 4;
+            while exponent >= last {
+                let mut raised = 0;
+                while raised < MOMENTS {
+                    let e = EXPONENTS[raised];
+                    if e[axis] == exponent {
+                        let mut lower = [e[0] as usize, e[1] as usize, e[2] as usize];
+                        lower[axis] -= 1;
+                        steps[axis][step] = (raised, slot(lower[0], lower[1], lower[2]));
+                        step += 1;
+                    }
+                    raised += 1;
+                }
+                exponent -= 1;
+            }
+            last += 1;
+        }
+        assert!(step == MOMENTS);
+        axis += 1;
+    }
+    steps
+};
 
 impl<S: Scalar> std::ops::AddAssign for Moments<S> {
     fn add_assign(&mut self, other: Self) {

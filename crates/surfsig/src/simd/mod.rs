@@ -5,6 +5,7 @@ pub(crate) mod accumulate;
 pub(crate) mod instruction_set;
 pub(crate) mod lanes;
 pub(crate) mod select;
+pub(crate) mod split;
 
 pub use instruction_set::InstructionSet;
 pub(crate) use instruction_set::for_each_instruction_set;

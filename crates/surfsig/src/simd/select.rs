@@ -6,6 +6,7 @@
 
 use super::InstructionSet;
 use super::instruction_set::Kind;
+use crate::cell_index::Lattice;
 
 /// The ball is d^2 <= r^2 (1 + 1e-5), in units of r: float32 offsets cannot decide a tie, and on a
 /// regular grid many points lie exactly on the sphere.
@@ -73,6 +74,18 @@ pub(crate) struct Ball {
     pub scale: f32,
     /// Half the size of a row along y and z, in units of the radius.
     pub half_step: f32,
+}
+
+impl Ball {
+    /// The ball around the query at this offset from its row's middle; `scale` is one over the radius.
+    pub fn around(offset: [f32; 3], scale: f32, lattice: &Lattice) -> Self {
+        let units = f64::from(scale);
+        Self {
+            query: offset.map(|o| f64::from(o) * units),
+            scale,
+            half_step: (lattice.half_step() * units) as f32,
+        }
+    }
 }
 
 /// How far a walk has come: the window, and the rank within it.
@@ -180,29 +193,30 @@ fn select_baseline<const RANKS: bool>(
     }
 }
 
+/// For each mask of eight lanes, the lanes that are set, packed to the left.
+#[cfg(target_arch = "x86_64")]
+pub(super) static PACK_LEFT: [[i32; 8]; 256] = {
+    let mut table = [[0; 8]; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut lane, mut packed) = (0, 0_usize);
+        while lane < 8 {
+            if mask >> lane & 1 == 1 {
+                table[mask][packed] = lane;
+                packed += 1;
+            }
+            lane += 1;
+        }
+        mask += 1;
+    }
+    table
+};
+
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{BALL_LIMIT, Ball, Block, Place, Placement, Rows, Window, gather_by};
+    use super::{BALL_LIMIT, Ball, Block, PACK_LEFT, Place, Placement, Rows, Window, gather_by};
     use std::arch::x86_64::*;
     use std::ops::Range;
-
-    /// For each mask of eight lanes, the lanes that are set, packed to the left.
-    static PACK_LEFT: [[i32; 8]; 256] = {
-        let mut table = [[0; 8]; 256];
-        let mut mask = 0;
-        while mask < 256 {
-            let (mut lane, mut packed) = (0, 0_usize);
-            while lane < 8 {
-                if mask >> lane & 1 == 1 {
-                    table[mask][packed] = lane;
-                    packed += 1;
-                }
-                lane += 1;
-            }
-            mask += 1;
-        }
-        table
-    };
 
     #[target_feature(enable = "avx2,fma,popcnt")]
     pub(super) fn gather_avx2<const RANKS: bool>(

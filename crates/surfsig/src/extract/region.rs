@@ -1,0 +1,50 @@
+//! A thread's work where points are dense: whole regions, through the hierarchy.
+
+use super::extraction::ColumnsPart;
+use super::shares::DenseCell;
+use super::{Monitor, Pending, Worker};
+use crate::Error;
+use crate::cell_index::CellIndex;
+use crate::simd::lanes::LANES;
+
+impl Worker<'_> {
+    /// Fills a part of the columns with the queries of these cells, one after the other.
+    pub(super) fn extract_region(
+        &mut self,
+        corner: [i64; 3],
+        cells: &[DenseCell],
+        part: &mut ColumnsPart<'_>,
+        monitor: &Monitor,
+    ) -> Result<(), Error> {
+        let CellIndex { x, y, z, .. } = self.asked;
+        let offset = |rank: usize| [x[rank], y[rank], z[rank]];
+        self.hierarchical.enter_region(corner);
+        let mut first = 0;
+        for DenseCell { key, cell, ranks } in cells {
+            self.hierarchical.enter_cell(*key, *cell, ranks.clone().map(offset));
+            while let Some((leaf, queries)) = self.hierarchical.next_leaf() {
+                monitor.check()?;
+                monitor.add(queries.len());
+                for query in queries {
+                    let number = self.hierarchical.number(query);
+                    let rank = ranks.start + number;
+                    self.pending.push(Pending {
+                        key: *key,
+                        offset: offset(rank),
+                        leaf: Some(leaf),
+                        entry: first + number,
+                        query: self.asked.point_of_rank[rank],
+                        radius: 1.0,
+                    });
+                    self.moments.push(self.hierarchical.moments::<f32>(leaf, offset(rank)));
+                    if self.pending.len() == LANES {
+                        self.fit_pending(part);
+                    }
+                }
+            }
+            first += ranks.len();
+        }
+        self.fit_pending(part);
+        Ok(())
+    }
+}
