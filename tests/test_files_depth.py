@@ -3,6 +3,7 @@
 import io
 import json
 import struct
+import sys
 import tracemalloc
 import warnings
 import zlib
@@ -100,6 +101,14 @@ def test_scales_that_make_no_sense(tmp_path: Path, scale: Any) -> None:
         read(saved(tmp_path, png(depths())), intrinsics=CAMERA, depth_scale=scale)
 
 
+@pytest.mark.parametrize("scale", [1e-40, 1e-320])
+def test_a_tiny_scale_warns_of_nothing(tmp_path: Path, scale: float) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cloud = read(saved(tmp_path, png(depths())), intrinsics=CAMERA, depth_scale=scale)
+    assert not cloud.finite.any()
+
+
 def test_other_formats_take_no_intrinsics(tmp_path: Path) -> None:
     (tmp_path / "a.xyz").write_text("1 2 3\n")
     with pytest.raises(InvalidInputError, match="holds text data, for which 'intrinsics' means nothing"):
@@ -138,6 +147,14 @@ def test_images_that_are_no_depths(tmp_path: Path, content: bytes, message: str)
     finally:
         tracemalloc.stop()
     assert "\n" not in str(error.value)
+
+
+def test_without_pillow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = saved(tmp_path, png(depths()))
+    monkeypatch.setitem(sys.modules, "PIL", None)
+    with pytest.raises(InvalidInputError, match=r"needs? Pillow: pip install 'surfsig\[image\]'") as error:
+        read(path, intrinsics=CAMERA)
+    assert str(error.value).startswith(str(path))
 
 
 def test_a_colour_image_is_named_before_intrinsics_are_asked_for(tmp_path: Path) -> None:

@@ -54,3 +54,10 @@ def test_a_coordinate_that_makes_no_sense_far_into_the_file(tmp_path: Path, valu
     rows.tofile(tmp_path / "a.bin")
     with pytest.raises(FileFormatError, match="no KITTI scan: its point 4321 would be at"):
         read(tmp_path / "a.bin")
+
+
+def test_a_table_called_bin_is_text(tmp_path: Path) -> None:
+    (tmp_path / "a.bin").write_text("1.5 2.5 3.5\n1 2 3.00\n" * 16)
+    assert (tmp_path / "a.bin").stat().st_size % 16 == 0
+    assert format_name(tmp_path / "a.bin") == "text"
+    assert read(tmp_path / "a.bin").points[:2].tolist() == [[1.5, 2.5, 3.5], [1, 2, 3]]

@@ -32,14 +32,6 @@ _GREY = 0
 _BLOCK = 1 << 16
 
 
-def check_available() -> None:
-    """Make sure that Pillow is installed; an `InvalidInputError` says how to."""
-    try:
-        import PIL.Image  # noqa: F401
-    except ImportError:
-        raise InvalidInputError("depth images need Pillow: pip install 'surfsig[image]'") from None
-
-
 def read(
     file: BinaryIO,
     source: str,
@@ -57,13 +49,12 @@ def read(
     FileFormatError
         If the image is cut off, broken, or one of colours.
     InvalidInputError
-        If `intrinsics` are missing or make no sense, or `depth_scale` does not.
+        If `intrinsics` or Pillow are missing, or `intrinsics` or `depth_scale` make no sense.
     """
     size = os.fstat(file.fileno()).st_size
     _check_header(file.read(_HEADER.itemsize), size, source)
     fx, fy, cx, cy = _camera(intrinsics, source)
     scale = _scale(depth_scale, source)
-    check_available()
     depths = _decoded(file, source)
     progress.advance(size)
     height, width = depths.shape
@@ -73,9 +64,11 @@ def read(
     for start in range(0, values.size, _BLOCK):
         block = values[start : start + _BLOCK]
         v, u = np.divmod(np.arange(start, start + len(block)), width)
-        z = np.where(block == 0, np.nan, block / scale)
         rows = points[start : start + _BLOCK]
-        rows[:, 0], rows[:, 1], rows[:, 2] = (u - cx) * z / fx, (v - cy) * z / fy, z
+        # A tiny scale or focal length leads beyond float32.
+        with np.errstate(over="ignore", invalid="ignore"):
+            z = np.where(block == 0, np.nan, block / scale)
+            rows[:, 0], rows[:, 1], rows[:, 2] = (u - cx) * z / fx, (v - cy) * z / fy, z
     return PointCloud(points, viewpoint=np.zeros(3), grid=(height, width))
 
 
@@ -124,8 +117,10 @@ def _scale(depth_scale: float, source: str) -> float:
 
 def _decoded(file: BinaryIO, source: str) -> NDArray[Any]:
     """Give the image's numbers (height, width)."""
-    from PIL import Image
-
+    try:
+        from PIL import Image
+    except ImportError:
+        raise InvalidInputError(f"{source}: depth images need Pillow: pip install 'surfsig[image]'") from None
     file.seek(0)
     # From a buffer: reading from a file, Python allocates whatever length a broken chunk claims to have.
     content = io.BytesIO(file.read())

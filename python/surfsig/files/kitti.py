@@ -21,7 +21,8 @@ _FAR = 1e6
 
 def recognise(opening: Opening) -> bool:
     """Tell by the extension, a size of whole points, and numbers that can be coordinates."""
-    if opening.extension != ".bin" or opening.size % _ROW.itemsize:
+    # The digits of a table would make small, plausible numbers.
+    if opening.extension != ".bin" or opening.size % _ROW.itemsize or opening.is_text:
         return False
     values = np.frombuffer(opening.head, "<f4")
     return bool(values.any() and _plausible(values).all())
