@@ -324,3 +324,18 @@ def test_a_header_with_no_points_is_an_empty_cloud(tmp_path: Path, content: byte
         assert isinstance(again, PointCloud)
         assert list(again.fields) == ["k1"]
         assert len(again) == 0
+
+
+def test_an_archive_that_promises_more_than_it_can_hold_allocates_nothing(tmp_path: Path) -> None:
+    content = bytearray(zipped(npy_header("(40_000_000, 3)")))
+    # The sizes in the archive's own entry say that everything is there.
+    entry = content.rindex(b"PK\x01\x02")
+    content[entry + 20 : entry + 28] = struct.pack("<II", 960_000_128, 960_000_128)
+    (tmp_path / "a.npz").write_bytes(content)
+    tracemalloc.start()
+    try:
+        with pytest.raises(FileFormatError, match="cut off"):
+            read(tmp_path / "a.npz")
+        assert tracemalloc.get_traced_memory()[1] < 10_000_000
+    finally:
+        tracemalloc.stop()

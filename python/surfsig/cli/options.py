@@ -55,7 +55,7 @@ def input_options(command: Function) -> Function:
         click.option(
             "--unit",
             type=click.Choice(list(UNITS)),
-            help="The unit of the file's numbers; all else is then in metres, a radius and positions too.",
+            help="The unit of the file's numbers. All is then in metres: radius, positions, output.",
         ),
         click.option(
             "--box",

@@ -85,6 +85,12 @@ def read(
     UserWarning
         If the last line of a text file is cut off (it is dropped) or may be, or values are left out that are
         no numbers.
+
+    Notes
+    -----
+    Memory: binary PLY and PCD, NPZ, and NPY (n, 3) need the cloud itself and a few MB (a PLY file whose lists
+    differ in length also what follows the first that does); other files up to twice the cloud and more. A box
+    or a unit makes a copy.
     """
     path = Path(path)
     corners = None if box is None else box_array(box)

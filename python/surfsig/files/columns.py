@@ -16,6 +16,8 @@ from surfsig.point_cloud import PointCloud
 # this share of the cloud's extent (many programs print UTM coordinates in full and declare them "float").
 LOSS_ALLOWED = 1e-6
 
+# What a `PointCloud` keeps as it is.
+_COORDINATES = (np.dtype("<f4"), np.dtype(">f4"), np.dtype("<f8"), np.dtype(">f8"))
 _COLOURS = {
     prefix + letter: name
     for name in ("red", "green", "blue", "alpha")
@@ -241,18 +243,34 @@ def aligned_blocks(chunks: Chunks | None, count: int) -> Iterable[tuple[slice, N
 
 
 def columns_of(rows: NDArray[Any]) -> dict[str, NDArray[Any]]:
-    """Take a structured array apart into contiguous columns of the machine's byte order.
+    """Take a structured array apart, as `filled_columns` does."""
+    return filled_columns(rows.dtype, len(rows), blocks_of(rows, 4096))
 
-    Block by block, because a wide row (signatures: a kilobyte) would otherwise be fetched once per column.
+
+def filled_columns(
+    dtype: np.dtype[Any], count: int, blocks: Iterable[NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """Take structured blocks apart into columns of the machine's byte order.
+
+    By blocks, because a wide row (signatures: a kilobyte) would otherwise be fetched once per column. Columns
+    x, y and z of one floating type lie side by side in memory, where `cloud_from_columns` takes them as the
+    cloud's coordinates without a copy; all others are contiguous.
+
+    Parameters
+    ----------
+    dtype
+        Structured: what the blocks have.
+    count
+        Rows of all blocks together.
+    blocks
+        In their order.
     """
-    columns: dict[str, NDArray[Any]] = {}
-    for name in rows.dtype.names or ():
-        kind = rows.dtype[name]
-        columns[name] = np.empty((len(rows), *kind.shape), kind.base.newbyteorder("="))
-    for start in range(0, len(rows), 4096):
-        block = rows[start : start + 4096]
+    columns = _empty_columns(dtype, count)
+    start = 0
+    for block in blocks:
         for name, column in columns.items():
-            column[start : start + 4096] = block[name]
+            column[start : start + len(block)] = block[name]
+        start += len(block)
     return columns
 
 
@@ -284,6 +302,21 @@ def numeric_columns(rows: NDArray[Any], source: str) -> dict[str, NDArray[Any]]:
         warnings.warn(f"{source}: left out the field '{name}', which holds no numbers", stacklevel=3)
     return {
         name: rows[name].reshape(len(rows), -1) if rows[name].ndim > 1 else rows[name] for name in numeric
+    }
+
+
+def _empty_columns(dtype: np.dtype[Any], count: int) -> dict[str, NDArray[Any]]:
+    names = dtype.names or ()
+    kinds = {name: dtype[name].base.newbyteorder("=") for name in names}
+    axes = [next((name for name in names if name.lower() == axis), "") for axis in "xyz"]
+    if "" in axes or any(dtype[n] not in _COORDINATES or kinds[n] != kinds[axes[0]] for n in axes):
+        axes = []
+    points = np.empty((count if axes else 0, 3), kinds[axes[0]] if axes else None)
+    return {
+        name: points[:, axes.index(name)]
+        if name in axes
+        else np.empty((count, *dtype[name].shape), kinds[name])
+        for name in names
     }
 
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import os
 from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
-from surfsig.files.columns import cloud_from_columns
+from surfsig.files.columns import cloud_from_columns, filled_columns
 from surfsig.files.opening import Opening
 from surfsig.files.progress import Progress
+from surfsig.files.rows import row_blocks
 from surfsig.point_cloud import PointCloud
 
-_NAMES = ("x", "y", "z", "intensity")
-_ROW = np.dtype([(name, "<f4") for name in _NAMES])
+_ROW = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
 # No sensor looks as far (in metres, or even in millimetres).
 _FAR = 1e6
 
@@ -36,10 +37,9 @@ def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
     FileFormatError
         If it holds what can be no coordinate.
     """
-    data = file.read()
-    progress.advance(len(data))
-    rows = np.frombuffer(data, _ROW)
-    cloud = cloud_from_columns({name: rows[name] for name in _NAMES}, source=source, viewpoint=np.zeros(3))
+    count = os.fstat(file.fileno()).st_size // _ROW.itemsize
+    columns = filled_columns(_ROW, count, row_blocks(file, _ROW, count, source, progress))
+    cloud = cloud_from_columns(columns, source=source, viewpoint=np.zeros(3))
     wrong = np.flatnonzero(~_plausible(cloud.offsets).all(axis=1))
     if len(wrong):
         place = ", ".join(f"{value:.3g}" for value in cloud.offsets[wrong[0]])

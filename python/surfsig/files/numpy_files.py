@@ -24,12 +24,15 @@ from surfsig.files.columns import (
     numeric_columns,
 )
 from surfsig.files.progress import Progress
+from surfsig.files.rows import filled
 from surfsig.point_cloud import PointCloud
 
 NPY_MAGIC = npy.MAGIC_PREFIX
 ZIP_MAGIC = b"PK"
 # Names in an NPZ file that are no field of the points.
 RESERVED = ("points", "viewpoint", "grid", "origin", "notes")
+# The most bytes that one byte of a deflated member makes.
+MAX_DEFLATE_RATIO = 1032
 # What a broken ZIP archive raises: RuntimeError if encrypted, NotImplementedError if compressed unusually.
 _BROKEN = (ValueError, EOFError, OSError, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError)
 
@@ -43,8 +46,7 @@ def read_npy(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
         If it is cut off or no such array.
     """
     size = os.fstat(file.fileno()).st_size
-    array = _read_array(file, size, source)
-    progress.advance(size)
+    array = _read_array(file, size, source, progress)
     return _cloud_from_array(array, source)
 
 
@@ -61,6 +63,7 @@ def read_npz(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
         If it is cut off, not NumPy's, or has no coordinates.
     """
     arrays: dict[str, NDArray[Any]] = {}
+    size = os.fstat(file.fileno()).st_size
     try:
         with zipfile.ZipFile(file) as archive:
             for info in archive.infolist():
@@ -70,8 +73,12 @@ def read_npz(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
                         f"{source}: a ZIP archive, but not of NumPy's arrays (it holds {name[:40]!r})"
                     )
                 with archive.open(info) as member:
-                    arrays[name] = _read_array(member, info.file_size, f"{source}: {name}")
-                progress.advance(info.compress_size)
+                    most = _most_bytes(info, size)
+                    stored = info.compress_type == zipfile.ZIP_STORED
+                    told = progress if stored else None
+                    arrays[name] = _read_array(member, most, f"{source}: {name}", told)
+                if not stored:
+                    progress.advance(info.compress_size)
     except FileFormatError:
         raise
     except _BROKEN as error:
@@ -158,7 +165,12 @@ def _write_header(member: IO[bytes], shape: tuple[int, ...], dtype: np.dtype[Any
     )
 
 
-def _read_array(file: IO[bytes], size: int, source: str) -> NDArray[Any]:
+def _most_bytes(info: zipfile.ZipInfo, size: int) -> int:
+    """Give the most bytes that a member of an archive of `size` bytes can have, whatever its entry says."""
+    return min(info.file_size, min(info.compress_size, size) * MAX_DEFLATE_RATIO)
+
+
+def _read_array(file: IO[bytes], size: int, source: str, progress: Progress | None) -> NDArray[Any]:
     """Read one array whose file has `size` bytes; nothing is allocated that the file does not hold."""
     shape, fortran_order, dtype = _read_header(file, source)
     if dtype.hasobject:
@@ -169,19 +181,18 @@ def _read_array(file: IO[bytes], size: int, source: str) -> NDArray[Any]:
             f"{source}: cut off: its header promises an array of the shape {shape} ({needed} bytes), "
             f"the file has {size}"
         )
+    if not dtype.itemsize:
+        raise FileFormatError(f"{source}: points must be real numbers, not {dtype}")
+    array = np.empty(math.prod(shape), dtype)
     try:
-        data = file.read(needed)
+        whole = filled(file, array, progress)
         # One byte more, to have a ZIP member's checksum compared.
         file.read(1)
     except _BROKEN as error:
         raise FileFormatError(f"{source}: cut off or broken ({_one_line(error)})") from None
-    if len(data) != needed:
-        raise FileFormatError(
-            f"{source}: cut off: {needed} bytes of data are promised, {len(data)} are there"
-        )
-    if not dtype.itemsize:
-        raise FileFormatError(f"{source}: points must be real numbers, not {dtype}")
-    return np.frombuffer(data, dtype).reshape(shape, order="F" if fortran_order else "C")
+    if not whole:
+        raise FileFormatError(f"{source}: cut off: {needed} bytes of data are promised, fewer are there")
+    return array.reshape(shape, order="F" if fortran_order else "C")
 
 
 def _read_header(file: IO[bytes], source: str) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:

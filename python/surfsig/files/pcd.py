@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -11,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
-from surfsig.files.columns import cloud_from_columns, columns_of
+from surfsig.files.columns import cloud_from_columns, filled_columns
 from surfsig.files.lines import take_rows
 from surfsig.files.progress import Progress
+from surfsig.files.rows import row_blocks
 from surfsig.point_cloud import PointCloud
 
 MAGIC = re.compile(rb"(?:[ \t]*(?:#[^\n]*)?\r?\n)*(?:VERSION[ \t]+\.?0?\.?[0-9]|FIELDS[ \t])")
@@ -24,6 +26,11 @@ MAX_NUMBERS = 1 << 16
 MAX_LZF_RATIO = 88
 
 _KEYS = ("VERSION", "FIELDS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
+# PCL keeps a colour in one number of any type, blue first.
+_CHANNELS = {
+    "rgb": {"red": 2, "green": 1, "blue": 0},
+    "rgba": {"red": 2, "green": 1, "blue": 0, "alpha": 3},
+}
 _KINDS = {"F": "f", "I": "i", "U": "u"}
 
 
@@ -79,27 +86,16 @@ def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
     size = os.fstat(file.fileno()).st_size - file.tell()
     match header.data:
         case "ascii":
-            columns = _read_ascii(file, header, size, source, progress)
+            columns = _named(_read_ascii(file, header, size, source, progress), header, source)
         case "binary":
             columns = _read_binary(file, header, size, source, progress)
         case _:
-            columns = _read_compressed(file, header, size, source, progress)
-    named: dict[str, NDArray[Any]] = {}
-    for key, values in columns.items():
-        name = key.partition(" ")[2]
-        if name == "_":
-            continue
-        if name in named:
-            raise FileFormatError(f"{source}: two fields are called '{name}'")
-        if name in ("rgb", "rgba") and values.ndim == 1 and values.dtype.itemsize == 4:
-            named.update(_unpacked(values, alpha=name == "rgba"))
-        else:
-            named[name] = values
+            columns = _named(_read_compressed(file, header, size, source, progress), header, source)
     axes = {
         kind for name, kind in zip(header.names, header.types, strict=True) if name.lower() in ("x", "y", "z")
     }
     return cloud_from_columns(
-        named,
+        columns,
         source=source,
         viewpoint=header.viewpoint,
         grid=(header.height, header.width) if header.height > 1 else None,
@@ -134,12 +130,19 @@ def _read_ascii(
 def _read_binary(
     file: BinaryIO, header: Header, size: int, source: str, progress: Progress
 ) -> dict[str, NDArray[Any]]:
-    dtype = np.dtype(header.parts())
-    needed = header.points * dtype.itemsize
-    _check_size(needed, size, header, source)
-    rows = np.frombuffer(file.read(needed), dtype)
-    progress.advance(needed)
-    return columns_of(rows)
+    whole = np.dtype(header.parts())
+    _check_size(header.points * whole.itemsize, size, header, source)
+    # The type of a row as the cloud's columns see it: each channel of a colour at its own byte, no padding.
+    fields: Mapping[str, Any] = whole.fields or {}
+    names, kinds, offsets = [], [], []
+    for name, (key, channel) in _places(header, source).items():
+        kind, offset = fields[key][:2]
+        names.append(name)
+        kinds.append(kind if channel is None else np.dtype("u1"))
+        offsets.append(offset + (channel or 0))
+    dtype = np.dtype({"names": names, "formats": kinds, "offsets": offsets, "itemsize": whole.itemsize})
+    blocks = row_blocks(file, dtype, header.points, source, progress)
+    return filled_columns(dtype, header.points, blocks)
 
 
 def _read_compressed(
@@ -238,9 +241,29 @@ def _check_size(needed: int, size: int, header: Header, source: str) -> None:
         )
 
 
-def _unpacked(values: NDArray[Any], *, alpha: bool) -> dict[str, NDArray[Any]]:
-    """Take colours from the 4 bytes, blue first, that PCL keeps in one number of any type."""
-    channels = np.ascontiguousarray(values).view(np.uint8).reshape(-1, 4)
-    names = ("blue", "green", "red", "alpha")
-    order = (2, 1, 0, 3) if alpha else (2, 1, 0)
-    return {names[i]: channels[:, i].copy() for i in order}
+def _places(header: Header, source: str) -> dict[str, tuple[str, int | None]]:
+    """Say for each column of the cloud which field it is, and which byte of it if that is a packed colour."""
+    places: dict[str, tuple[str, int | None]] = {}
+    for key, kind, shape in header.parts():
+        name = key.partition(" ")[2]
+        if name == "_":
+            continue
+        if name in places:
+            raise FileFormatError(f"{source}: two fields are called '{name}'")
+        if name in _CHANNELS and not shape and np.dtype(kind).itemsize == 4:
+            places |= {colour: (key, byte) for colour, byte in _CHANNELS[name].items()}
+        else:
+            places[name] = (key, None)
+    return places
+
+
+def _named(fields: dict[str, NDArray[Any]], header: Header, source: str) -> dict[str, NDArray[Any]]:
+    """Give the cloud's columns of whole fields."""
+    return {
+        name: fields[key] if byte is None else _bytes(fields[key])[:, byte].copy()
+        for name, (key, byte) in _places(header, source).items()
+    }
+
+
+def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:
+    return np.ascontiguousarray(values).view(np.uint8).reshape(-1, values.dtype.itemsize)

@@ -18,10 +18,11 @@ from surfsig.files.columns import (
     column_names,
     columns_of,
     exact_float32,
+    filled_columns,
     scalar_columns,
 )
 from surfsig.files.lines import take_rows
-from surfsig.files.ply_elements import Element, Property, skip_element, vertex_rows
+from surfsig.files.ply_elements import Element, Property, element_blocks, skip_element
 from surfsig.files.progress import Progress
 from surfsig.files.rows import write_rows
 from surfsig.point_cloud import PointCloud
@@ -94,15 +95,12 @@ def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
             f"of data, {size} are there"
         )
     if header.order:
-        buffer = np.frombuffer(file.read(), np.uint8)
-        progress.advance(buffer.size)
-        offset = 0
         for element in before:
-            offset = skip_element(buffer, offset, element, source)
-        columns, offset = vertex_rows(buffer, offset, vertex, source)
+            skip_element(file, element, source, progress)
+        blocks = element_blocks(file, vertex, source, progress)
+        columns = filled_columns(vertex.single_dtype(), vertex.count, blocks)
         for element in after:
-            offset = skip_element(buffer, offset, element, source)
-        del buffer
+            skip_element(file, element, source, progress)
     else:
         rows = take_rows(
             file,

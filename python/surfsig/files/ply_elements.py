@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
-from surfsig.files.columns import columns_of
+from surfsig.files.progress import Progress
+from surfsig.files.rows import BLOCK_BYTES, filled
+
+# Rows that are looked at one by one before their numbers are taken.
+VISITED_ROWS = 4096
 
 
 @dataclass
@@ -74,6 +80,10 @@ class Element:
                         break
         return " ".join(kept)
 
+    def single_dtype(self) -> np.dtype[Any]:
+        """Give the type of a row's single numbers, side by side."""
+        return np.dtype([(item.name, item.dtype) for item in self.properties if not item.length])
+
     def row_dtype(self, lengths: list[int]) -> np.dtype[Any]:
         """Give the type of a row whose lists have these lengths."""
         parts: list[tuple[Any, ...]] = []
@@ -82,87 +92,105 @@ class Element:
             if item.length:
                 parts += [(f"length {i}", item.length), (f"list {i}", item.dtype, (next(remaining),))]
             else:
-                parts.append((f"value {i}", item.dtype))
+                parts.append((item.name, item.dtype))
         return np.dtype(parts)
 
 
-def skip_element(buffer: NDArray[np.uint8], offset: int, element: Element, source: str) -> int:
-    """Give the offset of what follows an element's data.
+def skip_element(file: BinaryIO, element: Element, source: str, progress: Progress) -> None:
+    """Pass over an element's data.
+
+    Raises
+    ------
+    FileFormatError
+        If they are not all there.
+    """
+    # The names of an element that nobody reads may be anything, the same twice included.
+    numbered = [Property(f"{i}", item.dtype, item.length) for i, item in enumerate(element.properties)]
+    for _ in element_blocks(file, Element(element.name, element.count, numbered), source, progress):
+        pass
+
+
+def element_blocks(
+    file: BinaryIO, element: Element, source: str, progress: Progress
+) -> Iterator[NDArray[Any]]:
+    """Read an element block by block, as structured arrays with its single numbers among their fields.
+
+    Rows whose lists all have the lengths of the first row's (a mesh of triangles) are read as they lie in the
+    file; from the first block with others on, each row is visited. A block is valid until the next one.
 
     Raises
     ------
     FileFormatError
         If the data are not all there.
     """
-    rows = _uniform_rows(buffer, offset, element, source)
-    if rows is not None:
-        return offset + int(rows.nbytes)
-    _, end = _walk(buffer, offset, element, source)
-    return end
-
-
-def vertex_rows(
-    buffer: NDArray[np.uint8], offset: int, element: Element, source: str
-) -> tuple[dict[str, NDArray[Any]], int]:
-    """Give an element's single numbers as columns by name, and the offset of what follows.
-
-    Raises
-    ------
-    FileFormatError
-        If the data are not all there.
-    """
-    rows = _uniform_rows(buffer, offset, element, source)
-    single = [(i, item) for i, item in enumerate(element.properties) if not item.length]
-    if rows is not None:
-        columns = columns_of(rows[[f"value {i}" for i, _ in single]])
-        return {item.name: columns[f"value {i}"] for i, item in single}, offset + int(rows.nbytes)
-    starts, end = _walk(buffer, offset, element, source)
-    columns = {}
-    for i, item in single:
-        kind = np.dtype(item.dtype)
-        places = starts[:, i, None] + np.arange(kind.itemsize)
-        columns[item.name] = buffer[places].view(kind)[:, 0]
-    return columns, end
-
-
-def _uniform_rows(
-    buffer: NDArray[np.uint8], offset: int, element: Element, source: str
-) -> NDArray[Any] | None:
-    """View all rows at once if their lists have the lengths of the first row's (a mesh of triangles)."""
     if not element.properties or not element.count:
-        return np.empty(0, element.row_dtype([0] * len(element.properties)))
-    lengths = []
-    if element.has_lists:
-        place = offset
-        for item in element.properties:
-            if item.length:
-                lengths.append(_length(buffer, place, item, element, source))
-                place += np.dtype(item.length).itemsize + lengths[-1] * np.dtype(item.dtype).itemsize
-            else:
-                place += np.dtype(item.dtype).itemsize
-        if place > buffer.size:
-            raise _cut_off(source, element)
+        return
+    lengths = _first_lengths(file, element, source)
     dtype = element.row_dtype(lengths)
-    end = offset + element.count * dtype.itemsize
-    if end > buffer.size:
-        if lengths:
-            return None
+    rows = max(1, BLOCK_BYTES // dtype.itemsize)
+    buffer = np.empty(min(rows, element.count), dtype)
+    for start in range(0, element.count, rows):
+        block = buffer[: element.count - start]
+        place = file.tell()
+        whole = filled(file, block)
+        if not whole and not lengths:
+            raise _cut_off(source, element)
+        if not whole or not _have_lengths(block, lengths):
+            file.seek(place)
+            yield from _visited(file, element, element.count - start, source, progress)
+            return
+        progress.advance(block.nbytes)
+        yield block
+
+
+def _first_lengths(file: BinaryIO, element: Element, source: str) -> list[int]:
+    """Give the lengths of the first row's lists, and leave the file where it is."""
+    place = file.tell()
+    lengths = []
+    for item in element.properties:
+        size = np.dtype(item.dtype).itemsize
+        if item.length:
+            length = np.frombuffer(file.read(np.dtype(item.length).itemsize), np.uint8)
+            lengths.append(_length(length, 0, item, element, source))
+            size *= lengths[-1]
+        file.seek(size, os.SEEK_CUR)
+    if file.tell() > os.fstat(file.fileno()).st_size:
         raise _cut_off(source, element)
-    rows = buffer[offset:end].view(dtype)
-    for name, length in zip(
-        (name for name in dtype.names or () if name.startswith("length")), lengths, strict=True
-    ):
-        if (rows[name] != length).any():
-            return None
-    return rows
+    file.seek(place)
+    return lengths
+
+
+def _have_lengths(block: NDArray[Any], lengths: list[int]) -> bool:
+    names = [name for name in block.dtype.names or () if name.startswith("length ")]
+    return all((block[name] == length).all() for name, length in zip(names, lengths, strict=True))
+
+
+def _visited(
+    file: BinaryIO, element: Element, count: int, source: str, progress: Progress
+) -> Iterator[NDArray[Any]]:
+    """Visit the last `count` rows of an element one by one, and leave the file at their end."""
+    place = file.tell()
+    buffer = np.frombuffer(file.read(), np.uint8)
+    offset = 0
+    for start in range(0, count, VISITED_ROWS):
+        starts, end = _walk(buffer, offset, min(VISITED_ROWS, count - start), element, source)
+        block = np.empty(len(starts), element.single_dtype())
+        for i, item in enumerate(element.properties):
+            if not item.length:
+                kind = np.dtype(item.dtype)
+                block[item.name] = buffer[starts[:, i, None] + np.arange(kind.itemsize)].view(kind)[:, 0]
+        progress.advance(end - offset)
+        offset = end
+        yield block
+    file.seek(place + offset)
 
 
 def _walk(
-    buffer: NDArray[np.uint8], offset: int, element: Element, source: str
+    buffer: NDArray[np.uint8], offset: int, count: int, element: Element, source: str
 ) -> tuple[NDArray[np.int64], int]:
-    """Visit every row of an element with lists of differing lengths: where each property begins."""
-    starts = np.empty((element.count, len(element.properties)), np.int64)
-    for row in range(element.count):
+    """Visit rows with lists of differing lengths: where each property begins, and where the rows end."""
+    starts = np.empty((count, len(element.properties)), np.int64)
+    for row in range(count):
         for i, item in enumerate(element.properties):
             starts[row, i] = offset
             if item.length:

@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
+from surfsig.files.columns import filled_columns
 from surfsig.files.lines import line_blocks, parse
 from surfsig.files.opening import Opening
 from surfsig.files.progress import Progress
+from surfsig.files.rows import row_blocks
 from surfsig.files.triangles import merged, normal_fields, sampled, vertex_normals
 from surfsig.point_cloud import PointCloud
 
@@ -68,9 +70,8 @@ def _read_binary(file: BinaryIO, source: str, progress: Progress) -> NDArray[Any
         raise FileFormatError(
             f"{source}: cut off: {count} triangles need {_size(count)} bytes, the file has {size}"
         )
-    rows = np.frombuffer(file.read(count * _TRIANGLE.itemsize), _TRIANGLE)
-    progress.advance(size)
-    return rows["corners"].reshape(-1, 3)
+    blocks = row_blocks(file, _TRIANGLE, count, source, progress)
+    return filled_columns(_TRIANGLE, count, blocks)["corners"].reshape(-1, 3)
 
 
 def _read_ascii(file: BinaryIO, source: str, progress: Progress) -> NDArray[Any]:
