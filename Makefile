@@ -4,16 +4,17 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 OUT    ?= demo
+COUNT  ?= 100000
 PREFIX ?= /usr/local
 
 # What the compiled module is made from; a change of any rebuilds it.
 SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help demo test lint format bench docs wheel check-wheel header install-c clean build
+.PHONY: help demo test lint format bench bench-reading fuzz docs tour wheel check-wheel header install-c clean build
 .DEFAULT_GOAL := help
 
 help: ## Say what there is to make
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 demo: build ## Run the main job and draw it into demo/
 	$(BIN)/python examples/demo.py $(OUT)
@@ -40,9 +41,19 @@ format: $(VENV)/.tools ## Format all code
 bench: build ## Time surfsig and its peers in one run, and write BENCHMARKS.md
 	$(BIN)/python benchmarks/run.py --write
 
-docs: build ## Build the API reference: target/doc (Rust) and build/docs (Python)
-	cargo doc --workspace --no-deps
-	$(BIN)/python -m pdoc --docformat numpy --output-directory build/docs surfsig
+bench-reading: build ## Time the reading of files, and write that table of BENCHMARKS.md
+	$(BIN)/python benchmarks/reading.py --write
+
+fuzz: build ## Read damaged files of all formats: make fuzz COUNT=100000
+	$(BIN)/python fuzz/mutate.py --count $(COUNT)
+
+docs: build ## Build the API reference: target/doc (Rust) and build/docs (Python, the C headers)
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+	$(BIN)/python -W error -m pdoc --docformat numpy --output-directory build/docs surfsig
+	cp crates/surfsig-c/include/surfsig.h crates/surfsig-c/include/surfsig.hpp build/docs
+
+tour: build ## Run the code of docs/tour.md, and draw its pictures
+	$(BIN)/python examples/tour.py
 
 wheel: $(VENV)/.tools ## Build the wheel, for all Pythons from 3.10 on, into dist/
 	rm -rf dist

@@ -12,9 +12,6 @@ from peers import PEERS
 from rich.console import Console
 from rich.table import Table
 
-BEGIN = "<!-- begin: written by `make bench` -->"
-END = "<!-- end: written by `make bench` -->"
-
 TARGET_POINTS = 200_000
 TARGET_RADIUS = 0.02
 COLUMNS = (
@@ -145,22 +142,30 @@ def import_cost(results: Results) -> float:
 
 def notes(results: Results) -> list[str]:
     """Return the sentences that belong to the tables."""
-    machine, settings = results["machine"], results["settings"]
+    settings = results["settings"]
     bare = statistics.median(results["import_seconds"]["bare"])
+    first = statistics.median(run["first_seconds"] for run in results["radii"][0]["ours"]["curvature"])
+    return [
+        *measured_on(results),
+        f"{settings['points']:,} points; threads: {settings['threads']}; rounds: {settings['rounds']}.",
+        f"The first extraction of a process at radius {results['radii'][0]['radius']} took {first:.3f} s; "
+        "the speeds are those of the later ones.",
+        memory_note(results["memory"]),
+        f"`import surfsig` adds {import_cost(results):.3f} s to the {bare:.3f} s of a bare `python -c ''`.",
+    ]
+
+
+def measured_on(results: Results) -> list[str]:
+    """Return what was measured when, on what machine, and the versions."""
+    machine = results["machine"]
     share = machine["busy_share_before"]
     busy = "other load unknown" if share is None else f"others kept {share:.0%} of it busy just before"
-    first = statistics.median(run["first_seconds"] for run in results["radii"][0]["ours"]["curvature"])
     versions = ", ".join(f"{name} {version}" for name, version in results["versions"].items())
     return [
         f"Measured on {results['date']} on {machine['processor']}, {machine['cores']} cores "
         f"({', '.join(machine['instruction_sets'])}), {machine['memory_bytes'] / 2**30:.0f} GiB, "
         f"{machine['system']}; {busy}.",
         f"Versions: {versions}.",
-        f"{settings['points']:,} points; threads: {settings['threads']}; rounds: {settings['rounds']}.",
-        f"The first extraction of a process at radius {results['radii'][0]['radius']} took {first:.3f} s; "
-        "the speeds are those of the later ones.",
-        memory_note(results["memory"]),
-        f"`import surfsig` adds {import_cost(results):.3f} s to the {bare:.3f} s of a bare `python -c ''`.",
     ]
 
 
@@ -209,17 +214,17 @@ def markdown_table(columns: Sequence[str], rows: Iterable[Row]) -> str:
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
 
 
-def update_section(document: Path, results: Results) -> None:
-    """Replace what stands between the two marker comments of `document`.
+def update_section(document: Path, command: str, text: str) -> None:
+    """Replace what stands between the two marker comments of a command in `document`.
 
     Raises
     ------
     ValueError
         When a marker is missing.
     """
-    text = document.read_text(encoding="utf-8")
-    head, begin, rest = text.partition(BEGIN)
-    _, end, tail = rest.partition(END)
-    if not begin or not end:
-        raise ValueError(f"{document.name} has no section between {BEGIN} and {END}")
-    document.write_text(f"{head}{begin}\n\n{markdown(results)}\n\n{end}{tail}", encoding="utf-8")
+    begin, end = (f"<!-- {mark}: written by `{command}` -->" for mark in ("begin", "end"))
+    head, found_begin, rest = document.read_text(encoding="utf-8").partition(begin)
+    _, found_end, tail = rest.partition(end)
+    if not found_begin or not found_end:
+        raise ValueError(f"{document.name} has no section between {begin} and {end}")
+    document.write_text(f"{head}{begin}\n\n{text}\n\n{end}{tail}", encoding="utf-8")

@@ -29,7 +29,7 @@ from peers import (
     python_program,
     run_json,
 )
-from report import TARGET_POINTS, TARGET_RADIUS, Results, print_tables, update_section
+from report import TARGET_POINTS, TARGET_RADIUS, Results, markdown, print_tables, update_section
 from rich.console import Console
 from rich.progress import Progress
 
@@ -207,7 +207,7 @@ def main() -> None:
     target.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     if arguments.write:
         try:
-            update_section(ROOT / "BENCHMARKS.md", results)
+            update_section(ROOT / "BENCHMARKS.md", "make bench", markdown(results))
         except (OSError, ValueError) as error:
             sys.exit(f"BENCHMARKS.md is not updated: {error}")
 

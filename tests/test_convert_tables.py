@@ -1,7 +1,6 @@
 """pandas DataFrames and Arrow tables, in and out."""
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -222,11 +221,3 @@ def test_without_the_library(module: str, method: str, command: str, monkeypatch
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(InvalidInputError, match=f"is not installed: {command}$"):
         getattr(PointCloud(POINTS), method)()
-
-
-def test_the_example_runs() -> None:
-    example = Path(__file__).parents[1] / "examples" / "neighbours.py"
-    done = subprocess.run([sys.executable, example], capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
-    lines = done.stdout.splitlines()
-    assert [line.partition(":")[0] for line in lines[1:]] == ["cleaning", "Open3D", "pandas", "Arrow"]

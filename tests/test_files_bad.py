@@ -136,7 +136,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
     ("content", "message"),
     [
         (b"", "the file is empty"),
-        (b"\xff\xd8\xff" + bytes(100), "holds JPEG image data, which cannot be read"),
+        (b"\x89PNG\r\n\x1a\n" + bytes(100), "the PNG image is cut off or broken \\(no header\\)"),
         (b"<!DOCTYPE html>\n<html><body>404</body></html>\n", "holds web page or XML data"),
         (np.random.default_rng(3).bytes(5000), "is not a PLY file, nor any other that can be read"),
         (bytes(100), "is not a PLY file"),
@@ -339,3 +339,23 @@ def test_an_archive_that_promises_more_than_it_can_hold_allocates_nothing(tmp_pa
         assert tracemalloc.get_traced_memory()[1] < 10_000_000
     finally:
         tracemalloc.stop()
+
+
+def test_messages_stay_one_line_whatever_a_library_or_a_file_says(tmp_path: Path) -> None:
+    # Arrow ends its own message in a line feed; escape codes in a name would reach the terminal.
+    content = bytearray(parquet())
+    content[4:30] = b"\x0f" * 26
+    path = tmp_path / "a\x1b[31m\n.parquet"
+    path.write_bytes(content)
+    with pytest.raises(FileFormatError) as error:
+        read(path)
+    assert str(error.value).isprintable()
+
+
+def test_parquet_column_name_that_is_no_utf8(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "a.parquet"
+    write(path, PointCloud(POINTS), {"label": np.arange(200)})
+    path.write_bytes(path.read_bytes().replace(b"label", b"\x80abel"))
+    with pytest.raises(FileFormatError, match="a column's name is not in UTF-8"):
+        read(path)

@@ -7,6 +7,8 @@ s = surfsig.extract(cloud, radius=0.02)
 s.k1, s.k2, s.normals, s.status            # curvature, per unit length, at every point
 w = s.signatures([100, 2000])              # equal surfaces have equal signatures
 surfsig.similarity(w[0], w[1])             # zeta, between 0 and 1
+
+`__version__` is the package's version, `INSTRUCTION_SET` the instructions that its kernels run on here.
 """
 
 from surfsig._surfsig import INSTRUCTION_SET, Frame, __version__

@@ -33,4 +33,7 @@ PAPER_SEEDS = 5
 """Draws of noise and poses in the paper's reproduction: an odd number, so that one is in the middle."""
 
 DEPTH_SCALE = 1000.0
-"""Units of a depth image's numbers per unit of length: millimetres to metres."""
+"""Units of a depth image per unit of length: millimetres to metres."""
+
+SAMPLING_SEED = 0
+"""Of the points that are spread over a mesh."""

@@ -164,6 +164,10 @@ class Extraction:
     def to_pandas(self) -> pd.DataFrame:
         """Give x, y, z and `columns` as a pandas DataFrame, whose index has the points' numbers (`indices`).
 
+        Returns
+        -------
+        pandas.DataFrame
+
         Raises
         ------
         InvalidInputError
@@ -175,6 +179,10 @@ class Extraction:
 
     def to_arrow(self) -> pa.Table:
         """Give x, y, z and `columns` as a PyArrow table, with radius and axes in its metadata.
+
+        Returns
+        -------
+        pyarrow.Table
 
         Raises
         ------
@@ -188,7 +196,12 @@ class Extraction:
         return table(PointCloud(self.points), self.columns(), notes)
 
     def status_counts(self) -> dict[str, int]:
-        """Return how many places have each status, by its name in lower case; none that has none."""
+        """Count the places of each status.
+
+        Returns
+        -------
+        The counts, by the status's name in lower case; none that has no place.
+        """
         counts = np.bincount(self.status, minlength=len(Status))
         return {status.name.lower(): int(counts[status]) for status in Status if counts[status]}
 
@@ -291,6 +304,11 @@ class Extraction:
         Yields
         ------
         Which places, their signatures (k, 242) or (k, 243), and their statuses (k,).
+
+        Raises
+        ------
+        InvalidInputError
+            If `block` is below 1, or `flat_atom` is not a finite number above 0.
         """
         if block < 1:
             raise InvalidInputError(f"block must be 1 or more, not {block}")

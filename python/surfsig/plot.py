@@ -21,7 +21,17 @@ MISSING = (0.72, 0.72, 0.72)
 
 
 def view_axes(azimuth: float, elevation: float) -> NDArray[np.float64]:
-    """Return right, up and towards the viewer, as rows (3, 3), for angles in degrees about z."""
+    """Return the axes of a view from a direction, with z upwards.
+
+    Parameters
+    ----------
+    azimuth, elevation
+        Of the viewer, in degrees about z from x, and above the plane of x and y.
+
+    Returns
+    -------
+    Right, up and towards the viewer, as rows (3, 3).
+    """
     azimuth, elevation = np.radians(azimuth), np.radians(elevation)
     towards = np.array(
         [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]

@@ -146,6 +146,10 @@ class PointCloud:
             Shared are C-contiguous coordinates in float32 or float64; ``points`` of Arrow where they are
             in one chunk and none is missing.
 
+        Returns
+        -------
+        PointCloud
+
         Raises
         ------
         InvalidInputError
@@ -183,6 +187,10 @@ class PointCloud:
     def to_pandas(self) -> pd.DataFrame:
         """Give x, y, z and the fields as a pandas DataFrame; (n, k) fields become NAME_0, NAME_1, ...
 
+        Returns
+        -------
+        pandas.DataFrame
+
         Raises
         ------
         InvalidInputError
@@ -196,6 +204,10 @@ class PointCloud:
         """Give x, y, z and the fields as a PyArrow table, with viewpoint and grid in its metadata.
 
         (n, k) fields become lists of k numbers. The table is the one that `surfsig.write` writes to Parquet.
+
+        Returns
+        -------
+        pyarrow.Table
 
         Raises
         ------

@@ -81,6 +81,15 @@ def similarity_matrix(a: ArrayLike, b: ArrayLike, *, either_side: bool = False) 
 def similarity_class(zeta: float) -> Literal["optimal", "good", "dissimilar"]:
     """Return the paper's class: optimal from 0.9 on, good from 0.5 on, else dissimilar.
 
+    Parameters
+    ----------
+    zeta
+        As `similarity` gives it.
+
+    Returns
+    -------
+    The class, in lower case.
+
     Raises
     ------
     InvalidInputError
@@ -97,8 +106,21 @@ def flipped(signatures: ArrayLike) -> NDArray[np.float64]:
     """Return the signatures of the same surfaces seen from their other side.
 
     From there k1 and k2 change places and signs: K stays, H is inverted, and the grid's axes change
-    places. The frame holds with an atom its mirror images, so w changes as the fields do. For
-    signatures in the surface's own axes, (..., 242) or (..., 243).
+    places. The frame holds with an atom its mirror images, so w changes as the fields do.
+
+    Parameters
+    ----------
+    signatures
+        In the surface's own axes, (..., 242) or (..., 243).
+
+    Returns
+    -------
+    Of the same shape, float64; a flat atom stays as it is.
+
+    Raises
+    ------
+    InvalidInputError
+        If they are not numbers of that shape.
     """
     rows = _rows(signatures)
     other = rows.copy()

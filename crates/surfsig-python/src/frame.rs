@@ -109,6 +109,10 @@ impl Frame {
     }
 
     /// The frame of the default parameters: table II, the power 3/2, 9,159 atoms. Made once.
+    ///
+    /// Returns
+    /// -------
+    /// Frame
     #[staticmethod]
     fn default(py: Python<'_>) -> PyResult<Self> {
         let frame = py.detach(|| surfsig::with_threads(None, surfsig::Frame::shared)).map_err(to_python)?;
@@ -117,6 +121,10 @@ impl Frame {
 
     /// The frame of the paper's reproduction: table II, eq. (4) as printed, 3,109 atoms, smallest
     /// eigenvalue of F F^T 2.37e-4 in metres (the paper: about 2.5e-4).
+    ///
+    /// Returns
+    /// -------
+    /// Frame
     #[staticmethod]
     fn reproduction(py: Python<'_>) -> PyResult<Self> {
         Self::own(py, FrameParameters::reproduction())
@@ -155,28 +163,76 @@ impl Frame {
         self.get().singular_values().collect::<Vec<_>>().into_pyarray(py)
     }
 
-    /// Smallest eigenvalue of F F^T for patches of the given side, with curvature per unit of the
-    /// side's own length; `side=1.0` gives it in patch units.
+    /// Smallest eigenvalue of F F^T: how well the frame tells curvature fields apart.
+    ///
+    /// Parameters
+    /// ----------
+    /// side : float
+    ///     Of the patch, with curvature per unit of its own length; 1.0 gives it in patch units.
+    ///
+    /// Returns
+    /// -------
+    /// float
+    ///
+    /// Raises
+    /// ------
+    /// InvalidInputError
+    ///     If the side is not a finite number above 0.
     fn smallest_eigenvalue(&self, side: f64) -> PyResult<f64> {
         check_side(side)?;
         Ok(self.get().smallest_eigenvalue(side))
     }
 
-    /// alpha, the curvature fields of a surface a, b, c, d, e, f in patch units: (242,) float64, K on
-    /// the 11 x 11 grid column by column, then H.
+    /// alpha, the curvature fields of a surface.
+    ///
+    /// Parameters
+    /// ----------
+    /// surface : sequence of float
+    ///     a, b, c, d, e, f of eq. (5) in patch units.
+    ///
+    /// Returns
+    /// -------
+    /// (242,) float64
+    ///     K on the 11 x 11 grid column by column, then H.
     fn curvature_fields<'py>(&self, py: Python<'py>, surface: [f64; 6]) -> Bound<'py, PyArray1<f64>> {
         let formula = self.get().parameters().formula;
         paraboloid(surface).curvature_fields(formula).to_vec().into_pyarray(py)
     }
 
-    /// c = pinv(F) alpha, eq. (2), of a surface a, b, c, d, e, f in patch units: one number per atom,
-    /// in the order of `atoms`. Its lengths and dot products are those of the 242 numbers of a
+    /// c = pinv(F) alpha, eq. (2). Its lengths and dot products are those of the 242 numbers of a
     /// signature.
+    ///
+    /// Parameters
+    /// ----------
+    /// surface : sequence of float
+    ///     a, b, c, d, e, f of eq. (5) in patch units.
+    ///
+    /// Returns
+    /// -------
+    /// (n,) float64
+    ///     One number per atom, in the order of `atoms`.
     fn coefficients<'py>(&self, py: Python<'py>, surface: [f64; 6]) -> Bound<'py, PyArray1<f64>> {
         py.detach(|| self.get().coefficients(&paraboloid(surface))).into_pyarray(py)
     }
 
-    /// Signatures of surfaces in their own axes: (m, 242) float32 and (m,) status numbers.
+    /// Signatures of surfaces in their own axes.
+    ///
+    /// Parameters
+    /// ----------
+    /// k1, k2 : (m,) float32
+    ///     Principal curvatures, per unit.
+    /// side : float
+    ///     Of the patch, in the same unit: twice the radius of an extraction.
+    ///
+    /// Returns
+    /// -------
+    /// (m, 242) float32, (m,) uint8
+    ///     Signatures, NaN where there is none, and `Status` numbers.
+    ///
+    /// Raises
+    /// ------
+    /// InvalidInputError
+    ///     If the side is not a finite number above 0, or the curvatures differ in length.
     #[pyo3(signature = (k1, k2, *, side))]
     fn signatures_of_curvatures<'py>(
         &self,
@@ -196,8 +252,24 @@ impl Frame {
         })
     }
 
-    /// Signatures of surfaces a, b, c, d, e, f, (m, 6) in the cloud's unit: (m, 242) float32 and (m,)
-    /// status numbers.
+    /// Signatures of surfaces in the sensor's axes.
+    ///
+    /// Parameters
+    /// ----------
+    /// surfaces : (m, 6) float32
+    ///     a, b, c, d, e, f of eq. (5) in the cloud's unit, as `Extraction.coefficients`.
+    /// side : float
+    ///     As in `signatures_of_curvatures`.
+    ///
+    /// Returns
+    /// -------
+    /// (m, 242) float32, (m,) uint8
+    ///     Signatures, NaN where there is none, and `Status` numbers.
+    ///
+    /// Raises
+    /// ------
+    /// InvalidInputError
+    ///     If the side is not a finite number above 0, or the surfaces are not (m, 6).
     #[pyo3(signature = (surfaces, *, side))]
     fn signatures_of_surfaces<'py>(
         &self,

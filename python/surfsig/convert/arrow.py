@@ -40,8 +40,12 @@ def cloud_of(
         table = data if isinstance(data, pa.Table) else pa.table(data)
     except (pa.ArrowException, TypeError) as broken:
         raise error(f"{source}: not a table ({' '.join(str(broken).split())[:100]})") from None
+    try:
+        names = table.column_names
+    except UnicodeDecodeError:
+        raise error(f"{source}: a column's name is not in UTF-8") from None
     columns: dict[str, NDArray[Any]] = {}
-    for name, column in zip(table.column_names, table.columns, strict=True):
+    for name, column in zip(names, table.columns, strict=True):
         values = _numbers(column)
         if values is not None:
             columns.setdefault(name, values)

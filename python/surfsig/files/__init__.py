@@ -37,14 +37,13 @@ def read(
 ) -> PointCloud:
     """Read a point cloud.
 
-    Formats: PLY, PCD, LAS, LAZ, COPC, E57, text (XYZ, CSV, TXT, ASC), NPY, NPZ, Parquet, meshes (OBJ, STL),
-    depth images (PNG), KITTI's scans (BIN).
+    From PLY, PCD, LAS, LAZ, COPC, E57, text (XYZ, CSV, TXT, ASC), NPY, NPZ, Parquet, STL, OBJ, KITTI's .bin
+    or a depth image (PNG of 16 bits).
 
     Parameters
     ----------
     path
-        The file; its content, not its extension, decides how it is read (only KITTI's scans, which are bare
-        numbers, need theirs, ``.bin``).
+        The file; its content, not its extension, decides how it is read.
     box
         Only the points in this box: (2, 3), its lowest and its highest corner, in the file's coordinates and
         unit; both belong to it. A COPC file is read no further than the box asks for.
@@ -54,11 +53,9 @@ def read(
     scan
         Of an E57 file with several scans, the one with this number, from 0; by default all of them.
     samples
-        Of a mesh (OBJ, STL), this many points spread evenly over its surface, in place of its vertices;
-        the same ones each time.
+        Of a mesh (OBJ, STL), this many points spread evenly over its surface, in place of its vertices.
     intrinsics
-        Of a depth image: the camera's (fx, fy, cx, cy) in pixels, with the middle of the first pixel at
-        (0, 0). Nobody can tell them from the image.
+        Of a depth image: (fx, fy, cx, cy) in pixels.
     depth_scale
         Of a depth image: units of its numbers per unit of length; 1000 by default (millimetres to metres).
     progress
@@ -67,8 +64,7 @@ def read(
     Returns
     -------
     PointCloud
-        Coordinates in the file's precision (text, and points on a mesh: float64), with all other values of
-        its points as fields. A depth image and a KITTI scan are seen from (0, 0, 0).
+        Coordinates in the file's precision (text: float64), with all other values of its points as fields.
 
     Raises
     ------
@@ -77,8 +73,7 @@ def read(
     FileFormatError
         If it is no point cloud, broken, or cut off.
     InvalidInputError
-        If an option has no meaning, or none for this file's format; if a depth image's intrinsics, or the
-        library for a format, are missing.
+        If an option has no meaning, or none for this file's format.
 
     Warns
     -----
@@ -100,19 +95,21 @@ def read(
     }  # fmt: skip
     given = {name: value for name, value in options.items() if value is not None}
     with path.open("rb") as file:
-        kind, reader = formats.of_content(path, file)
+        size = os.fstat(file.fileno()).st_size
+        kind, reader = formats.of_content(path, file.read(formats.HEAD_BYTES), size)
         for name in given:
             if name not in kind.takes:
                 raise InvalidInputError(f"{path}: holds {kind.name} data, for which '{name}' means nothing")
         if corners is not None and "box" in kind.takes:
             given["box"] = corners
+        file.seek(0)
         try:
-            cloud = reader(file, str(path), Progress(progress, os.fstat(file.fileno()).st_size), **given)
+            cloud = reader(file, str(path), Progress(progress, size), **given)
         except MemoryError as error:
             raise FileFormatError(f"{path}: {error or 'too large for the memory'}") from error
         except InvalidInputError as error:
-            # With options the caller may be wrong, or without those that the format needs; else the file is.
-            if given or kind.needs:
+            # With options the caller may be wrong, without any only the file can be.
+            if given:
                 raise
             raise FileFormatError(f"{path}: {error}") from error
     if corners is not None:
@@ -123,6 +120,15 @@ def read(
 def format_name(path: str | os.PathLike[str]) -> str:
     """Say what format a file has by its content ("PLY", "text", ...).
 
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    The format's name.
+
     Raises
     ------
     OSError, FileFormatError
@@ -130,12 +136,17 @@ def format_name(path: str | os.PathLike[str]) -> str:
     """
     path = Path(path)
     with path.open("rb") as file:
-        kind, _ = formats.of_content(path, file)
+        kind, _ = formats.of_content(path, file.read(formats.HEAD_BYTES), os.fstat(file.fileno()).st_size)
     return kind.name
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Make sure, before a long computation, that `write` will be able to write to `path`.
+
+    Parameters
+    ----------
+    path
+        The file to be written.
 
     Raises
     ------

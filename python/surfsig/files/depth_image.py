@@ -1,35 +1,40 @@
-"""Depth images: PNG through Pillow, which is an optional dependency (``surfsig[image]``)."""
+"""Depth images: PNG of 16 bits, through Pillow, which is an optional dependency (``surfsig[image]``)."""
 
 from __future__ import annotations
 
-import io
 import os
-import warnings
-from typing import Any, BinaryIO
+import struct
+import zlib
+from numbers import Real
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfsig import defaults
+from surfsig.defaults import DEPTH_SCALE
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
-# Deflate makes at most 1032 bytes of one.
-_MAX_RATIO = 1032
-# Signature, then the chunk IHDR: its length and name, width, height, bits per channel, type of colour.
-_HEADER = np.dtype(
-    [
-        ("signature", "V8"),
-        ("name", "V8"),
-        ("width", ">u4"),
-        ("height", ">u4"),
-        ("bits", "u1"),
-        ("colour", "u1"),
-    ]
-)
-_GREY = 0
-_BLOCK = 1 << 16
+MAGIC = b"\x89PNG\r\n\x1a\n"
+
+_KINDS = {0: "grey", 2: "colour", 3: "palette", 4: "grey and alpha", 6: "colour and alpha"}
+_PIECE_BYTES = 1 << 16
+_BLOCK_ROWS = 64
+
+
+def check_available() -> None:
+    """Make sure that Pillow is installed.
+
+    Raises
+    ------
+    InvalidInputError
+        With the command that installs it.
+    """
+    try:
+        import PIL.PngImagePlugin  # noqa: F401
+    except ImportError:
+        raise InvalidInputError("depth images need Pillow: pip install 'surfsig[image]'") from None
 
 
 def read(
@@ -37,100 +42,128 @@ def read(
     source: str,
     progress: Progress,
     intrinsics: ArrayLike | None = None,
-    depth_scale: float = defaults.DEPTH_SCALE,
+    depth_scale: float = DEPTH_SCALE,
 ) -> PointCloud:
-    """Read an open PNG image of depths as an organised cloud, seen from (0, 0, 0).
+    """Read an open depth image, as a camera at (0, 0, 0) that looks along z sees it.
 
-    The pixel in column u and row v, from 0, of depth d is the point z = d / depth_scale,
-    x = (u - cx) z / fx, y = (v - cy) z / fy, in float32; a depth of 0 is none, and the point NaN.
+    A depth d at column u and row v is the point z = d / depth_scale, x = (u - cx) z / fx,
+    y = (v - cy) z / fy, computed in float64 and kept as float32; depth 0 is no point (NaN). The cloud is
+    organised like the image.
+
+    Parameters
+    ----------
+    file, source, progress
+        The open file, its name, and whom to tell.
+    intrinsics
+        (fx, fy, cx, cy) in pixels.
+    depth_scale
+        Units of depth per unit of length.
 
     Raises
     ------
     FileFormatError
-        If the image is cut off, broken, or one of colours.
+        If it is cut off, broken, or no image of 16 bits of grey.
     InvalidInputError
-        If `intrinsics` or Pillow are missing, or `intrinsics` or `depth_scale` make no sense.
+        If Pillow or the intrinsics are missing, or no such numbers.
     """
     size = os.fstat(file.fileno()).st_size
-    _check_header(file.read(_HEADER.itemsize), size, source)
-    fx, fy, cx, cy = _camera(intrinsics, source)
-    scale = _scale(depth_scale, source)
-    depths = _decoded(file, source)
-    progress.advance(size)
-    height, width = depths.shape
-    values = depths.ravel()
-    points = np.empty((values.size, 3), np.float32)
-    # Pixels by blocks, as a broken image may be all height or all width.
-    for start in range(0, values.size, _BLOCK):
-        block = values[start : start + _BLOCK]
-        v, u = np.divmod(np.arange(start, start + len(block)), width)
-        rows = points[start : start + _BLOCK]
-        # A tiny scale or focal length leads beyond float32.
-        with np.errstate(over="ignore", invalid="ignore"):
-            z = np.where(block == 0, np.nan, block / scale)
-            rows[:, 0], rows[:, 1], rows[:, 2] = (u - cx) * z / fx, (v - cy) * z / fy, z
-    return PointCloud(points, viewpoint=np.zeros(3), grid=(height, width))
-
-
-def _check_header(head: bytes, size: int, source: str) -> None:
-    if len(head) < _HEADER.itemsize:
-        raise FileFormatError(f"{source}: the PNG image is cut off")
-    header = np.frombuffer(head, _HEADER)[0]
-    if header["colour"] != _GREY:
-        raise FileFormatError(f"{source}: is a colour image, not one of depths")
-    width, height, bits = (int(header[name]) for name in ("width", "height", "bits"))
-    if bits not in (8, 16):
-        raise FileFormatError(f"{source}: its pixels have {bits} bits, depths 8 or 16")
-    if width * height * bits > 8 * _MAX_RATIO * size:
-        raise FileFormatError(
-            f"{source}: cut off or broken: its header promises {width} x {height} pixels, "
-            f"the file has {size} bytes"
-        )
-
-
-def _camera(intrinsics: ArrayLike | None, source: str) -> list[float]:
-    if intrinsics is None:
-        raise InvalidInputError(
-            f"{source}: a depth image needs the camera's intrinsics in pixels: intrinsics=(fx, fy, cx, cy), "
-            "in the shell --intrinsics fx,fy,cx,cy"
-        )
-    try:
-        values = np.array(intrinsics, np.float64)
-    except (TypeError, ValueError):
-        values = np.empty(0)
-    if values.shape != (4,) or not np.isfinite(values).all() or not (values[:2] > 0).all():
-        raise InvalidInputError(
-            f"{source}: intrinsics must be four numbers (fx, fy, cx, cy), fx and fy above 0"
-        )
-    return [float(value) for value in values]
-
-
-def _scale(depth_scale: float, source: str) -> float:
-    try:
-        scale = float(depth_scale)
-    except (TypeError, ValueError):
-        scale = np.nan
-    if not 0 < scale < np.inf:
-        raise InvalidInputError(f"{source}: depth_scale must be a positive number")
-    return scale
-
-
-def _decoded(file: BinaryIO, source: str) -> NDArray[Any]:
-    """Give the image's numbers (height, width)."""
-    try:
-        from PIL import Image
-    except ImportError:
-        raise InvalidInputError(f"{source}: depth images need Pillow: pip install 'surfsig[image]'") from None
+    _check_image(file, source)
+    fx, fy, cx, cy = _checked(intrinsics, depth_scale)
+    check_available()
     file.seek(0)
-    # From a buffer: reading from a file, Python allocates whatever length a broken chunk claims to have.
-    content = io.BytesIO(file.read())
+    depths = _decoded(file, source)
+    height, width = depths.shape
+    offsets = np.empty((height, width, 3), np.float32)
+    # A tiny scale or focal length makes infinite coordinates, which are no points.
+    with np.errstate(over="ignore", invalid="ignore"):
+        for start in range(0, height, _BLOCK_ROWS):
+            rows = depths[start : start + _BLOCK_ROWS]
+            z = np.where(rows == 0, np.nan, rows / np.float64(depth_scale))
+            block = offsets[start : start + len(rows)]
+            block[..., 0] = (np.arange(width) - cx) * z / fx
+            block[..., 1] = (np.arange(start, start + len(rows))[:, None] - cy) * z / fy
+            block[..., 2] = z
+            progress.advance(size * len(rows) // height)
+    progress.advance(size)
+    return PointCloud(offsets.reshape(-1, 3), viewpoint=np.zeros(3), grid=(height, width))
+
+
+def _check_image(file: BinaryIO, source: str) -> None:
+    head = file.read(33)
+    if len(head) < 33 or head[12:16] != b"IHDR":
+        raise FileFormatError(f"{source}: the PNG image is cut off or broken (no header)")
+    width, height, bits, colour = struct.unpack_from(">IIBB", head, 16)
+    if (bits, colour) != (16, 0):
+        kind = _KINDS.get(colour, "unknown")
+        raise FileFormatError(
+            f"{source}: holds a PNG image of {bits} bits ({kind}), not a depth image (16 bits, grey)"
+        )
+    # Each row has a byte more, for its filter.
+    _check_data(file, height * (1 + 2 * width), source)
+
+
+def _check_data(file: BinaryIO, needed: int, source: str) -> None:
+    """Make sure that the pixels are all there: Pillow leaves those that are missing 0, and says nothing."""
+    inflater = zlib.decompressobj()
+    file.seek(len(MAGIC))
+    while needed > 0:
+        head = file.read(8)
+        if len(head) < 8:
+            raise FileFormatError(f"{source}: the PNG image is cut off or broken (pixels are missing)")
+        length, name = struct.unpack(">I4s", head)
+        end = file.tell() + length + 4
+        if name == b"IDAT":
+            for start in range(0, length, _PIECE_BYTES):
+                data = file.read(min(_PIECE_BYTES, length - start))
+                if not data or needed <= 0:
+                    break
+                needed -= _inflated_bytes(inflater, data, needed, source)
+        file.seek(end)
+
+
+def _inflated_bytes(inflater: zlib._Decompress, data: bytes, needed: int, source: str) -> int:
+    """Count the bytes in a piece of a stream, holding few of them at a time, until there are enough."""
+    count = 0
+    while count < needed:
+        try:
+            piece = inflater.decompress(data, _PIECE_BYTES)
+        except zlib.error as error:
+            raise FileFormatError(f"{source}: the PNG image is cut off or broken ({error})") from None
+        count += len(piece)
+        data = inflater.unconsumed_tail
+        if not data and len(piece) < _PIECE_BYTES:
+            break
+    return count
+
+
+def _checked(
+    intrinsics: ArrayLike | None, depth_scale: float
+) -> tuple[np.float64, np.float64, np.float64, np.float64]:
+    if intrinsics is None:
+        raise InvalidInputError("a depth image needs the camera's intrinsics (--intrinsics fx,fy,cx,cy)")
     try:
-        with warnings.catch_warnings():
-            # Of sizes that the file's own has justified, and of extras that do not touch the depths.
-            warnings.simplefilter("ignore")
-            with Image.open(content, formats=["PNG"]) as image:
-                return np.asarray(image)
-    # Besides OSError, a broken chunk raises whatever Pillow's parser of it may raise.
+        numbers = np.array(intrinsics, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    if numbers.shape != (4,) or not np.isfinite(numbers).all() or not (numbers[:2] > 0).all():
+        raise InvalidInputError(
+            "intrinsics must be four finite numbers fx, fy, cx, cy with fx and fy above 0"
+        )
+    if not isinstance(depth_scale, Real) or not 0 < depth_scale < np.inf:
+        raise InvalidInputError(f"depth_scale must be a finite number above 0, not {depth_scale!r:.40}")
+    fx, fy, cx, cy = numbers
+    return fx, fy, cx, cy
+
+
+def _decoded(file: BinaryIO, source: str) -> NDArray[np.uint16]:
+    from PIL import Image
+
+    try:
+        with Image.open(file, formats=["PNG"]) as image:
+            return np.asarray(image).astype(np.uint16)
+    except MemoryError:
+        raise
+    # Pillow's chunks and zlib raise whatever they like: SyntaxError, struct.error, OSError, ValueError.
     except Exception as error:
-        reason = " ".join(str(error).split())[:100]
-        raise FileFormatError(f"{source}: the PNG image is cut off or broken ({reason})") from None
+        text = " ".join(str(error).split())[:100]
+        raise FileFormatError(f"{source}: the PNG image is cut off or broken ({text})") from None

@@ -7,16 +7,31 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol
+from typing import Any, BinaryIO, NamedTuple, Protocol
 
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError, InvalidInputError
-from surfsig.files import e57, e57_writer, kitti, numpy_files, obj, parquet, pcd, pcd_write, ply, stl, text
+from surfsig.files import (
+    depth_image,
+    e57,
+    e57_writer,
+    kitti,
+    numpy_files,
+    obj,
+    parquet,
+    pcd,
+    pcd_write,
+    ply,
+    stl,
+    text,
+)
 from surfsig.files.columns import Chunks
-from surfsig.files.opening import Opening, Recogniser, begins, matches
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
+
+HEAD_BYTES = 4096
+
 
 # Reads from an open file with a name (for messages); the options that the format takes come by keyword.
 Reader = Callable[..., PointCloud]
@@ -38,6 +53,24 @@ class Writer(Protocol):
         """Write everything; an exception leaves the file to the caller."""
 
 
+class Look(NamedTuple):
+    """What a file is recognised by.
+
+    Attributes
+    ----------
+    head
+        Its first bytes.
+    extension
+        In lower case, with the dot: for formats without a mark of their own.
+    size
+        Its bytes.
+    """
+
+    head: bytes
+    extension: str
+    size: int
+
+
 @dataclass(frozen=True)
 class Format:
     """A file format.
@@ -49,7 +82,7 @@ class Format:
     extensions
         In lower case, with the dot.
     recognise
-        Tells from what can be seen of a file at once whether it has this format.
+        Tells from the first bytes, or else extension and size, whether a file has this format.
     read
         Reads from an open file; None if the format is only recognised, to be named in a message. A name
         (MODULE:FUNCTION) where the library behind it takes a while to import.
@@ -61,19 +94,46 @@ class Format:
         Names that a column cannot have.
     takes
         The options of `surfsig.read` that mean something to this format's reader.
-    needs
-        Those of them without which nothing can be read.
     """
 
     name: str
     extensions: tuple[str, ...]
-    recognise: Recogniser
+    recognise: Callable[[Look], bool]
     read: Reader | str | None = None
     write: Writer | str | None = None
     check: Callable[[], None] = lambda: None
     reserved: tuple[str, ...] = ("x", "y", "z")
     takes: tuple[str, ...] = ()
-    needs: tuple[str, ...] = ()
+
+
+def _begins(*marks: bytes) -> Callable[[Look], bool]:
+    return lambda look: look.head.startswith(marks)
+
+
+def _matches(pattern: re.Pattern[bytes]) -> Callable[[Look], bool]:
+    return lambda look: pattern.match(look.head) is not None
+
+
+def _is_text(look: Look) -> bool:
+    # UTF-16 begins with its mark; any other text has no zero and hardly a control character.
+    if look.head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return True
+    controls = sum(byte < 9 or 13 < byte < 32 for byte in look.head)
+    return 0 not in look.head and controls * 50 <= len(look.head)
+
+
+def _is_binary_stl(look: Look) -> bool:
+    # One that is cut off is known by its name only.
+    cut_off = look.extension == ".stl" and not _is_text(look)
+    return cut_off or stl.is_whole_binary(look.head, look.size)
+
+
+def _is_obj(look: Look) -> bool:
+    return _is_text(look) and (look.extension == ".obj" or obj.MAGIC.match(look.head) is not None)
+
+
+def _is_kitti(look: Look) -> bool:
+    return look.extension == ".bin" and not _is_text(look) and kitti.is_plausible(look.head, look.size)
 
 
 def _function(of: Callable[..., Any] | str) -> Any:
@@ -89,62 +149,63 @@ _LAZ = re.compile(rb"LASF.{100}[\x80-\xff]", re.DOTALL)
 
 _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
 
-# The order matters: what the content tells comes before what size and extension tell, and text comes last,
-# because every PCD header, every OBJ file and every HTML page is text as well.
+# The order matters: text comes last, because every PCD header and every HTML page is text as well; before it
+# those that have no mark of their own.
 FORMATS = (
-    Format("PLY", (".ply",), matches(ply.MAGIC), ply.read, ply.write),
-    Format("PCD", (".pcd",), matches(pcd.MAGIC), pcd.read, pcd_write.write, reserved=pcd_write.RESERVED),
-    Format("NPY", (".npy",), begins(numpy_files.NPY_MAGIC), numpy_files.read_npy),
+    Format("PLY", (".ply",), _matches(ply.MAGIC), ply.read, ply.write),
+    Format("PCD", (".pcd",), _matches(pcd.MAGIC), pcd.read, pcd_write.write, reserved=pcd_write.RESERVED),
+    Format("NPY", (".npy",), _begins(numpy_files.NPY_MAGIC), numpy_files.read_npy),
     Format(
         "NPZ",
         (".npz",),
-        begins(numpy_files.ZIP_MAGIC),
+        _begins(numpy_files.ZIP_MAGIC),
         numpy_files.read_npz,
         numpy_files.write_npz,
         reserved=(*numpy_files.RESERVED, "x", "y", "z"),
     ),
     Format(
-        "Parquet", (".parquet",), begins(parquet.MAGIC), parquet.read, parquet.write, parquet.check_available
+        "Parquet", (".parquet",), _begins(parquet.MAGIC), parquet.read, parquet.write, parquet.check_available
     ),
-    Format("LAZ", (".laz",), matches(_LAZ), "las:read", "las_write:write_laz", takes=("box",)),
-    Format("LAS", (".las",), begins(b"LASF"), "las:read", "las_write:write_las", takes=("box",)),
-    Format("E57", (".e57",), begins(e57.MAGIC), e57.read, e57_writer.write, takes=("scan",)),
+    Format("LAZ", (".laz",), _matches(_LAZ), "las:read", "las_write:write_laz", takes=("box",)),
+    Format("LAS", (".las",), _begins(b"LASF"), "las:read", "las_write:write_las", takes=("box",)),
+    Format("E57", (".e57",), _begins(e57.MAGIC), e57.read, e57_writer.write, takes=("scan",)),
     Format(
         "PNG image",
         (".png",),
-        begins(b"\x89PNG"),
-        "depth_image:read",
+        _begins(depth_image.MAGIC),
+        depth_image.read,
         takes=("intrinsics", "depth_scale"),
-        needs=("intrinsics",),
     ),
-    Format("JPEG image", (".jpg", ".jpeg"), begins(b"\xff\xd8\xff")),
-    Format("PDF", (".pdf",), begins(b"%PDF")),
-    Format("gzip archive", (".gz",), begins(b"\x1f\x8b")),
-    Format("binary glTF", (".glb",), begins(b"glTF")),
-    Format("HDF5", (".h5", ".hdf5"), begins(b"\x89HDF")),
-    Format("web page or XML", (".html", ".htm", ".xml"), matches(_HTML)),
-    Format("STL", (".stl",), stl.recognise, stl.read, takes=("samples",)),
-    Format("OBJ", (".obj",), obj.recognise, obj.read, takes=("samples",)),
-    Format("KITTI", (".bin",), kitti.recognise, kitti.read),
-    Format("text", (".xyz", ".csv", ".txt", ".asc"), lambda opening: opening.is_text, text.read),
+    Format("JPEG image", (".jpg", ".jpeg"), _begins(b"\xff\xd8\xff")),
+    Format("PDF", (".pdf",), _begins(b"%PDF")),
+    Format("gzip archive", (".gz",), _begins(b"\x1f\x8b")),
+    Format("binary glTF", (".glb",), _begins(b"glTF")),
+    Format("HDF5", (".h5", ".hdf5"), _begins(b"\x89HDF")),
+    Format("web page or XML", (".html", ".htm", ".xml"), _matches(_HTML)),
+    # A binary file may begin with "solid" too.
+    Format("STL", (".stl",), _is_binary_stl, stl.read_binary, takes=("samples",)),
+    Format("ASCII STL", (".stl",), _matches(stl.ASCII_MAGIC), stl.read_ascii, takes=("samples",)),
+    Format("KITTI", (".bin",), _is_kitti, kitti.read),
+    Format("OBJ", (".obj",), _is_obj, obj.read, takes=("samples",)),
+    Format("text", (".xyz", ".csv", ".txt", ".asc"), _is_text, text.read),
 )
 
 
-def of_content(path: Path, file: BinaryIO) -> tuple[Format, Reader]:
-    """Recognise an open file by its content, by its extension only where that says nothing.
+def of_content(path: Path, head: bytes, size: int) -> tuple[Format, Reader]:
+    """Recognise a file by its first bytes, whatever its extension says; only where those tell nothing by it.
 
     Raises
     ------
     FileFormatError
         If it is nothing that can be read; the message says what it is, where that is known.
     """
-    opening = Opening.of(path, file)
-    if not opening.head:
+    if not head:
         raise FileFormatError(f"{path}: the file is empty")
-    by_name = next((kind for kind in FORMATS if opening.extension in kind.extensions), None)
+    look = Look(head, path.suffix.lower(), size)
+    by_name = next((kind for kind in FORMATS if look.extension in kind.extensions), None)
     readable = ", ".join(kind.name for kind in FORMATS if kind.read is not None)
     for kind in FORMATS:
-        if kind.recognise(opening):
+        if kind.recognise(look):
             if kind.read is None:
                 raise FileFormatError(
                     f"{path}: holds {kind.name} data, which cannot be read (only {readable} can)"

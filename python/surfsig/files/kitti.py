@@ -1,53 +1,56 @@
-"""KITTI's Velodyne scans: x, y, z and intensity of each point as float32, and nothing else."""
+"""KITTI's scans (.bin): x, y, z and intensity as float32, without a header."""
 
 from __future__ import annotations
 
 import os
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
-from surfsig.files.columns import cloud_from_columns, filled_columns
-from surfsig.files.opening import Opening
 from surfsig.files.progress import Progress
-from surfsig.files.rows import row_blocks
 from surfsig.point_cloud import PointCloud
 
-_ROW = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
-# No sensor looks as far (in metres, or even in millimetres).
-_FAR = 1e6
+_POINT_BYTES = 16
+_BLOCK_POINTS = 1 << 16
+# Metres: far beyond the reach of any scanner.
+_FARTHEST = 1e6
 
 
-def recognise(opening: Opening) -> bool:
-    """Tell by the extension, a size of whole points, and numbers that can be coordinates."""
-    # The digits of a table would make small, plausible numbers.
-    if opening.extension != ".bin" or opening.size % _ROW.itemsize or opening.is_text:
-        return False
-    values = np.frombuffer(opening.head, "<f4")
-    return bool(values.any() and _plausible(values).all())
+def is_plausible(head: bytes, size: int) -> bool:
+    """Tell whether a file of `size` bytes that begins so may be such a scan."""
+    whole = len(head) // _POINT_BYTES * _POINT_BYTES
+    return whole > 0 and size % _POINT_BYTES == 0 and _are_points(_rows(head[:whole]))
 
 
 def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
-    """Read an open scan; the sensor, and so the viewpoint, is at (0, 0, 0).
+    """Read an open scan; the scanner is at (0, 0, 0).
 
     Raises
     ------
     FileFormatError
-        If it holds what can be no coordinate.
+        If a value is not finite, or too large for a coordinate in metres.
     """
-    count = os.fstat(file.fileno()).st_size // _ROW.itemsize
-    columns = filled_columns(_ROW, count, row_blocks(file, _ROW, count, source, progress))
-    cloud = cloud_from_columns(columns, source=source, viewpoint=np.zeros(3))
-    wrong = np.flatnonzero(~_plausible(cloud.offsets).all(axis=1))
-    if len(wrong):
-        place = ", ".join(f"{value:.3g}" for value in cloud.offsets[wrong[0]])
-        raise FileFormatError(f"{source}: no KITTI scan: its point {wrong[0]} would be at ({place})")
-    return cloud
+    count = os.fstat(file.fileno()).st_size // _POINT_BYTES
+    offsets = np.empty((count, 3), np.float32)
+    intensity = np.empty(count, np.float32)
+    for start in range(0, count, _BLOCK_POINTS):
+        data = file.read(_POINT_BYTES * min(_BLOCK_POINTS, count - start))
+        rows = _rows(data)
+        if not _are_points(rows):
+            raise FileFormatError(
+                f"{source}: is not a KITTI scan: a value is not finite, or {_FARTHEST:g} or more"
+            )
+        offsets[start : start + len(rows)] = rows[:, :3]
+        intensity[start : start + len(rows)] = rows[:, 3]
+        progress.advance(len(data))
+    return PointCloud(offsets, viewpoint=np.zeros(3), fields={"intensity": intensity})
 
 
-def _plausible(values: NDArray[np.float32]) -> NDArray[np.bool_]:
-    # NaN is not below anything.
-    plausible: NDArray[np.bool_] = np.abs(values) < _FAR
-    return plausible
+def _rows(data: bytes) -> NDArray[Any]:
+    return np.frombuffer(data, "<f4").reshape(-1, 4)
+
+
+def _are_points(rows: NDArray[Any]) -> bool:
+    return bool(np.isfinite(rows[:, 3]).all() and (np.abs(rows[:, :3]) < _FARTHEST).all())

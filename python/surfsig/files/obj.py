@@ -1,177 +1,173 @@
-"""OBJ: reads vertices, their colours and normals, and faces of any number of corners."""
+"""Wavefront OBJ: vertices, with colours and normals where each has one, and faces to spread samples over."""
 
 from __future__ import annotations
 
 import re
-from array import array
-from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
-from surfsig.files.columns import with_colours
-from surfsig.files.lines import Block, line_blocks, parse, warn_unterminated
-from surfsig.files.opening import Opening
+from surfsig.files import mesh
+from surfsig.files.columns import cloud_from_columns
+from surfsig.files.lines import Block, fault, line_blocks, parse, tokens_of, warn_unterminated
 from surfsig.files.progress import Progress
-from surfsig.files.triangles import normal_fields, sampled
 from surfsig.point_cloud import PointCloud
 
-_KEYWORDS = (
-    "v", "vt", "vn", "vp", "f", "fo", "l", "p", "o", "g", "s", "mg", "usemtl", "mtllib", "maplib", "usemap",
-    "shadow_obj", "trace_obj", "bevel", "c_interp", "d_interp", "lod", "deg", "bmat", "step", "cstype",
-    "curv", "curv2", "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con", "call", "csh", "ctech",
-    "stech",
-)  # fmt: skip
-_BLANK = rb"(?:[ \t]*(?:#[^\n]*)?\r?\n)*[ \t]*"
-_FIRST = re.compile(_BLANK + rb"(?:" + "|".join(_KEYWORDS).encode() + rb")[ \t]")
-_COMMENTS = re.compile(_BLANK + rb"(?:#[^\n]*)?\Z")
-_VERTEX = re.compile(rb"^[ \t]*v[ \t]+[-+.\d]", re.MULTILINE)
-# Values of a `v` line: x y z, perhaps a weight, perhaps red green blue and alpha.
-_COLOURS_OF = {3: 0, 4: 0, 6: 3, 7: 4}
+_LINE = rb"[ \t]*(?:(?:v|vn|vt|vp|f|l|p|o|g|s|mtllib|usemtl|usemap)(?:[ \t][^\r\n]*)?|#[^\r\n]*)?"
+_VERTEX = rb"[ \t]*v(?:[ \t]+[-+.\deE]+){3,}[ \t]*"
+# Whole lines of OBJ's words, of which one is a vertex.
+MAGIC = re.compile(rb"(?:\xef\xbb\xbf)?(?:" + _LINE + rb"[\r\n])*?" + _VERTEX + rb"(?:[\r\n]|$)")
 
-
-def _integers() -> array[int]:
-    return array("q")
-
-
-@dataclass
-class _Contents:
-    """What was read so far; corners and normals of faces are numbered as in the file, from 1."""
-
-    vertices: list[NDArray[np.float64]] = field(default_factory=list)
-    normals: list[NDArray[np.float64]] = field(default_factory=list)
-    width: int = 0
-    vertex_count: int = 0
-    normal_count: int = 0
-    corners: array[int] = field(default_factory=_integers)
-    corner_normals: array[int] = field(default_factory=_integers)
-    face_sizes: array[int] = field(default_factory=_integers)
-    face_lines: array[int] = field(default_factory=_integers)
-
-
-def recognise(opening: Opening) -> bool:
-    """Tell by the first statement, and a vertex near it; under its extension the one or comments will do."""
-    if not opening.is_text:
-        return False
-    first = _FIRST.match(opening.head) is not None
-    if opening.extension == ".obj":
-        return first or _COMMENTS.match(opening.head) is not None
-    return first and _VERTEX.search(opening.head) is not None
+# Python's own limit on digits would raise an error of another kind.
+_NUMBER = re.compile(r"[-+]?\d{1,18}", re.ASCII)
+_COLOURS = ("red", "green", "blue")
 
 
 def read(file: BinaryIO, source: str, progress: Progress, samples: int | None = None) -> PointCloud:
-    """Read an open OBJ file: its vertices in their order, or points spread over its faces.
+    """Read an open OBJ file.
 
-    Colours of vertices become red, green, blue (and alpha), and normals nx, ny, nz where there is one for
-    each vertex. Points on the faces have their triangle's normal.
+    The vertices are those of the file, in its order, as float64. Three numbers after a vertex's coordinates
+    are its colour: uint8 where all are whole numbers from 0 to 255, or 255 times those where they are 0 to 1.
+    Normals (nx, ny, nz) come from the file if there is one per vertex and the faces use it so. With
+    `samples`, that many points spread over the faces, with the faces' normals. Materials, textures, lines and
+    free-form surfaces are not read.
 
     Raises
     ------
     FileFormatError
-        Naming the first line that makes no sense.
+        If a line is broken or a face refers to a vertex that is missing; the message names the line.
+    InvalidInputError
+        If `samples` is no positive whole number, or there is no surface to spread them over.
     """
-    contents = _Contents()
-    last: Block | None = None
-    for last in line_blocks(file, 1, progress):
-        _take(contents, last, source)
-    if not contents.vertex_count:
-        raise FileFormatError(f"{source}: holds no points")
-    if last is not None and last.unterminated:
-        warn_unterminated(source, last.first + len(last.lines) - 1)
-    table = np.concatenate(contents.vertices)
-    points = np.ascontiguousarray(table[:, :3])
-    corners = _checked(contents, source)
+    parts = _Parts(source)
+    if file.read(3) != b"\xef\xbb\xbf":
+        file.seek(0)
+    for block in line_blocks(file, 1, progress):
+        parts.add(block)
+        if block.unterminated:
+            warn_unterminated(source, block.first + len(block.lines) - 1)
+    vertices, triangles = parts.finished()
+    mesh.check_vertices(vertices[:, :3], source)
     if samples is not None:
-        return sampled(points, _triangles(corners, np.array(contents.face_sizes, np.intp)), samples, source)
-    fields = _colours(table)
-    if contents.normal_count == len(points) and (
-        not contents.corner_normals or contents.corner_normals == contents.corners
-    ):
-        fields |= normal_fields(np.concatenate(contents.normals))
-    return PointCloud(points, fields=fields)
+        return mesh.sampled(vertices[:, :3], triangles, samples, source)
+    columns: dict[str, NDArray[Any]] = {axis: vertices[:, i] for i, axis in enumerate("xyz")}
+    columns.update(_colours(vertices[:, 3:]))
+    normals = parts.normals()
+    if normals is not None:
+        columns.update(zip(("nx", "ny", "nz"), normals.astype(np.float32).T, strict=True))
+    return cloud_from_columns(columns, source=source)
 
 
-def _take(contents: _Contents, block: Block, source: str) -> None:
-    """Add a block of lines; the texts of vertices and of normals keep their places, for messages."""
-    vertices = [""] * len(block.lines)
-    normals = [""] * len(block.lines)
-    for i, line in enumerate(block.lines):
-        keyword, *rest = line.partition("#")[0].split(None, 1) or [""]
-        match keyword:
-            case "v":
-                vertices[i] = rest[0] if rest else keyword
-                contents.vertex_count += 1
-                if not contents.width:
-                    contents.width = len(vertices[i].split())
-            case "vn":
-                normals[i] = rest[0] if rest else keyword
-                contents.normal_count += 1
-            case "f":
-                _take_face(contents, rest[0] if rest else "", block.first + i, source)
-            case word if word and word not in _KEYWORDS:
-                text = line.strip()[:40]
-                raise FileFormatError(
-                    f"{source}: line {block.first + i} of the OBJ file makes no sense: {text!r}"
-                )
-    width = contents.width if contents.width in _COLOURS_OF else 3
-    contents.vertices.append(parse(vertices, np.float64, width, source=source, first=block.first))
-    contents.normals.append(parse(normals, np.float64, 3, source=source, first=block.first))
+class _Parts:
+    """The parts of the file that count, gathered block by block."""
 
+    def __init__(self, source: str) -> None:
+        self._source = source
+        self._width = 0
+        self._vertices: list[NDArray[np.float64]] = []
+        self._normals: list[NDArray[np.float64]] = []
+        self._triangles: list[NDArray[np.intp]] = []
+        self._count = self._normal_count = 0
+        self._highest, self._highest_line = -1, 0
+        self._normals_alike = True
+        self._continued = ""
 
-def _take_face(contents: _Contents, text: str, number: int, source: str) -> None:
-    """Add a face: each corner is VERTEX, VERTEX/TEXTURE, VERTEX//NORMAL or VERTEX/TEXTURE/NORMAL."""
-    try:
-        if "/" in text:
-            parts = [token.split("/") for token in text.split()]
-            corners = [int(part[0]) for part in parts]
-            normals = [int(part[2]) for part in parts if len(part) > 2]
-        else:
-            corners, normals = [int(token) for token in text.split()], []
-        contents.corners.extend(_absolute(corners, contents.vertex_count))
-        contents.corner_normals.extend(_absolute(normals, contents.normal_count))
-    except (ValueError, OverflowError):
-        raise FileFormatError(f"{source}: line {number}: {text.strip()[:40]!r} is no face") from None
-    if len(corners) < 3:
-        raise FileFormatError(f"{source}: line {number}: a face needs three corners")
-    contents.face_sizes.append(len(corners))
-    contents.face_lines.append(number)
-
-
-def _absolute(indices: list[int], count: int) -> list[int]:
-    """Resolve negative numbers, which count back from the last one so far."""
-    if min(indices, default=0) >= 0:
-        return indices
-    return [index if index >= 0 else count + 1 + index for index in indices]
-
-
-def _checked(contents: _Contents, source: str) -> NDArray[np.intp]:
-    """Give the corners numbered from 0; raise where a face has one that the file does not hold."""
-    corners = np.array(contents.corners, np.intp) - 1
-    bad = np.flatnonzero((corners < 0) | (corners >= contents.vertex_count))
-    if len(bad):
-        ends = np.cumsum(contents.face_sizes)
-        line = contents.face_lines[int(np.searchsorted(ends, bad[0], side="right"))]
-        raise FileFormatError(
-            f"{source}: line {line}: a face has the corner {contents.corners[bad[0]]}, "
-            f"the file {contents.vertex_count} vertices"
+    def add(self, block: Block) -> None:
+        """Take the vertices, normals and faces of some lines."""
+        rows: dict[str, list[str]] = {"v": [""] * len(block.lines), "vn": [""] * len(block.lines)}
+        triangles: list[int] = []
+        for number, line in enumerate(block.lines):
+            if self._continued:
+                line, self._continued = self._continued + line, ""
+            if line.endswith("\\"):
+                self._continued = line[:-1] + " "
+                continue
+            word, _, rest = line.strip().replace("\t", " ").partition(" ")
+            if word == "v":
+                self._count += 1
+                rows[word][number] = rest
+            elif word == "vn":
+                self._normal_count += 1
+                rows[word][number] = rest
+            elif word == "f":
+                triangles += self._face(rest, block.first + number)
+        if triangles:
+            self._triangles.append(np.array(triangles, np.intp).reshape(-1, 3))
+        self._add_numbers(rows["v"], block.first)
+        self._normals.append(
+            parse(rows["vn"], np.float64, 3, source=self._source, first=block.first, comments=True)
         )
-    return corners
+
+    def finished(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """Give the vertices (n, 3 or more) and triangles (t, 3)."""
+        if self._highest >= self._count:
+            raise FileFormatError(
+                f"{self._source}: line {self._highest_line}: a face refers to vertex {self._highest + 1}, "
+                f"there are {self._count}"
+            )
+        if sum(map(len, self._vertices)) != self._count or not self._count:
+            raise FileFormatError(f"{self._source}: has no vertices, or some without numbers")
+        return np.concatenate(self._vertices), np.concatenate([np.empty((0, 3), np.intp), *self._triangles])
+
+    def normals(self) -> NDArray[np.float64] | None:
+        """Give the vertices' normals, if each vertex has just one."""
+        normals = np.concatenate(self._normals)
+        return normals if self._normals_alike and len(normals) == self._count else None
+
+    def _add_numbers(self, lines: list[str], first: int) -> None:
+        if not any(lines):
+            return
+        if not self._width:
+            self._width = len(tokens_of(next(filter(None, lines)), None))
+            if self._width < 3:
+                number = next(i for i, line in enumerate(lines) if line)
+                found = fault(lines[number], 3, None, comments=True)
+                raise FileFormatError(
+                    f"{self._source}: line {first + number}: {found[0] if found else 'no coordinates'}"
+                )
+        self._vertices.append(
+            parse(lines, np.float64, self._width, source=self._source, first=first, comments=True)
+        )
+
+    def _face(self, text: str, line: int) -> list[int]:
+        """Cut a face into triangles that share its first corner."""
+        corners = []
+        # Not `tokens_of`, to which "//" begins a comment.
+        for corner in text.partition("#")[0].split():
+            numbers = corner.split("/")
+            vertex = self._index(numbers[0], self._count, line)
+            if vertex > self._highest:
+                self._highest, self._highest_line = vertex, line
+            if len(numbers) > 2 and numbers[2]:
+                normal = self._index(numbers[2], self._normal_count, line)
+                self._normals_alike = self._normals_alike and normal == vertex
+            corners.append(vertex)
+        if len(corners) < 3:
+            raise FileFormatError(f"{self._source}: line {line}: a face with {len(corners)} corners")
+        fan = pairwise(corners[1:])
+        return [index for second, third in fan for index in (corners[0], second, third)]
+
+    def _index(self, text: str, count: int, line: int) -> int:
+        """Turn a number from 1, or one that counts back from the last one so far, into one from 0."""
+        if _NUMBER.fullmatch(text) is None:
+            raise FileFormatError(f"{self._source}: line {line}: {text[:40]!r} is no number of a vertex")
+        number = int(text)
+        index = number - 1 if number > 0 else count + number
+        if number == 0 or index < 0:
+            raise FileFormatError(
+                f"{self._source}: line {line}: a face refers to vertex {number}, {count} are before it"
+            )
+        return index
 
 
-def _triangles(corners: NDArray[np.intp], sizes: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Cut faces into fans of triangles around their first corners."""
-    starts = np.cumsum(sizes) - sizes
-    first = np.repeat(starts, sizes - 2)
-    step = np.arange(len(first)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2)
-    return np.stack([corners[first], corners[first + step + 1], corners[first + step + 2]], axis=1)
-
-
-def _colours(table: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
-    """Give the colours behind the coordinates, which are 0 to 1, or 0 to 255, as bytes where they fit."""
-    count = _COLOURS_OF[table.shape[1]]
-    colours = table[:, table.shape[1] - count :].T
-    if count and ((colours >= 0) & (colours <= 1)).all():
-        colours = np.round(colours * 255)
-    return with_colours(dict(zip(("red", "green", "blue", "alpha"), colours.copy(), strict=False)))
+def _colours(values: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
+    """Name what stands behind the coordinates: a colour, or else one weight, which is left out."""
+    if values.shape[1] < 3:
+        return {}
+    colours = values[:, :3]
+    if ((colours >= 0) & (colours <= 1)).all():
+        colours = np.round(255 * colours).astype(np.uint8)
+    return dict(zip(_COLOURS, colours.T, strict=True))

@@ -6,9 +6,9 @@ Metres throughout; heights grow along negative z (:mod:`surfsig.simulate.scanner
 
 >>> from surfsig import simulate
 >>> ball = simulate.Placed(simulate.Sphere(0.02), simulate.pose((0, 0, -0.02)), "ball")
->>> table = simulate.Placed(simulate.Rectangle((0.2, 0.2)), simulate.pose((0, 0, 0),
-simulate.facing(simulate.UP))) >>> cloud = simulate.Scanner(noise=5e-5).scan(simulate.Scene([ball, table]),
-seed=1)  # doctest: +SKIP
+>>> flat = simulate.pose((0, 0, 0), simulate.facing(simulate.UP))
+>>> table = simulate.Placed(simulate.Rectangle((0.2, 0.2)), flat, "table")
+>>> cloud = simulate.Scanner(noise=5e-5).scan(simulate.Scene([ball, table]), seed=1)
 """
 
 from .acquisitions import RANDOM_TILT, Acquisition, Jitter, paper_acquisition, paper_acquisitions

@@ -233,6 +233,10 @@ def paper_acquisition(
     seed, poses, jitter, scanner, truth
         See :func:`paper_acquisitions`.
 
+    Returns
+    -------
+    Acquisition
+
     Raises
     ------
     InvalidInputError
