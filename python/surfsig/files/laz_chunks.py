@@ -7,8 +7,11 @@ every size is compared with the file before lazrs sees it.
 from __future__ import annotations
 
 import contextlib
+import os
 import struct
+import threading
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import Any, BinaryIO, NamedTuple
 
@@ -24,6 +27,11 @@ from surfsig.files.progress import Progress
 PIECE_BYTES = 32 << 20
 # A chunk larger than a piece is believed up to this ratio; real points reach 20.
 MAX_RATIO = 1000
+
+# Of a thread that decodes times of before point format 6: address space, of which only what is used is taken.
+STACK_BYTES = 192 << 20
+# The size of stacks is the process's: one reader at a time changes it.
+_DEEP = threading.Lock()
 
 _COMPRESSOR_WITHOUT_CHUNKS = 1
 _ITEMS_START = 34
@@ -165,8 +173,6 @@ def decoded(
     FileFormatError
         If a chunk is cut off or broken.
     """
-    import lazrs
-
     dtype = header.point_format.dtype()
     record = _laszip_record(header, source)
     layers = _layers(record, header)
@@ -178,11 +184,38 @@ def decoded(
             _check_chunk(parts[-1], chunk, dtype.itemsize, layers, source)
         points = np.zeros(sum(chunk.points for chunk in piece) * dtype.itemsize, np.uint8)
         with one_line_errors(source):
-            lazrs.decompress_points_with_chunk_table(
-                b"".join(parts), record, points, [(chunk.points, chunk.size) for chunk in piece]
-            )
+            _decode(parts, record, points, [(chunk.points, chunk.size) for chunk in piece], header)
         yield points.view(dtype)
         progress.advance(sum(chunk.size for chunk in piece))
+
+
+def _decode(
+    parts: Sequence[bytes],
+    record: bytes,
+    points: NDArray[np.uint8],
+    table: Sequence[tuple[int, int]],
+    header: LasHeader,
+) -> None:
+    import lazrs
+
+    kind = header.point_format
+    if kind.id >= 6 or "gps_time" not in kind.dimension_names:
+        lazrs.decompress_points_with_chunk_table(b"".join(parts), record, points, list(table))
+        return
+    # lazrs reads old times by calling itself, in a damaged file very often: its threads' stacks overflow.
+    ends = np.cumsum([count * kind.size for count, _ in table])
+    jobs = [
+        (part, record, points[end - count * kind.size : end], [(count, length)])
+        for part, (count, length), end in zip(parts, table, ends, strict=True)
+    ]
+    with _DEEP, ThreadPoolExecutor(min(os.cpu_count() or 1, len(jobs))) as pool:
+        usual = threading.stack_size(STACK_BYTES)
+        try:
+            waiting = [pool.submit(lazrs.decompress_points_with_chunk_table, *job) for job in jobs]
+        finally:
+            threading.stack_size(usual)
+        for job in waiting:
+            job.result()
 
 
 def _laszip_record(header: LasHeader, source: str) -> bytes:
