@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import struct
+import warnings
 import zlib
 from numbers import Real
 from typing import BinaryIO
@@ -158,9 +160,14 @@ def _checked(
 def _decoded(file: BinaryIO, source: str) -> NDArray[np.uint16]:
     from PIL import Image
 
+    # From a buffer: reading from a file, Python allocates whatever length a broken chunk claims to have.
+    content = io.BytesIO(file.read())
     try:
-        with Image.open(file, formats=["PNG"]) as image:
-            return np.asarray(image).astype(np.uint16)
+        with warnings.catch_warnings():
+            # Of sizes that the data have justified, and of extras that do not touch the depths.
+            warnings.simplefilter("ignore")
+            with Image.open(content, formats=["PNG"]) as image:
+                return np.asarray(image).astype(np.uint16)
     except MemoryError:
         raise
     # Pillow's chunks and zlib raise whatever they like: SyntaxError, struct.error, OSError, ValueError.
