@@ -7,11 +7,8 @@ every size is compared with the file before lazrs sees it.
 from __future__ import annotations
 
 import contextlib
-import os
 import struct
-import threading
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any, BinaryIO, NamedTuple
 
@@ -21,17 +18,13 @@ from laspy.copc import CopcInfoVlr
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
+from surfsig.files import laz_child
 from surfsig.files.progress import Progress
 
 # Points are decoded in pieces of about so many bytes: several chunks, one for each thread.
 PIECE_BYTES = 32 << 20
 # A chunk larger than a piece is believed up to this ratio; real points reach 20.
 MAX_RATIO = 1000
-
-# Of a thread that decodes times of before point format 6: address space, of which only what is used is taken.
-STACK_BYTES = 192 << 20
-# The size of stacks is the process's: one reader at a time changes it.
-_DEEP = threading.Lock()
 
 _COMPRESSOR_WITHOUT_CHUNKS = 1
 _ITEMS_START = 34
@@ -176,46 +169,33 @@ def decoded(
     dtype = header.point_format.dtype()
     record = _laszip_record(header, source)
     layers = _layers(record, header)
-    for piece in _pieces(chunks, dtype.itemsize):
-        parts = []
-        for chunk in piece:
-            file.seek(chunk.offset)
-            parts.append(file.read(chunk.size))
-            _check_chunk(parts[-1], chunk, dtype.itemsize, layers, source)
-        points = np.zeros(sum(chunk.points for chunk in piece) * dtype.itemsize, np.uint8)
-        with one_line_errors(source):
-            _decode(parts, record, points, [(chunk.points, chunk.size) for chunk in piece], header)
-        yield points.view(dtype)
-        progress.advance(sum(chunk.size for chunk in piece))
+    with _decoding(header) as decode:
+        for piece in _pieces(chunks, dtype.itemsize):
+            parts = []
+            for chunk in piece:
+                file.seek(chunk.offset)
+                parts.append(file.read(chunk.size))
+                _check_chunk(parts[-1], chunk, dtype.itemsize, layers, source)
+            points = np.zeros(sum(chunk.points for chunk in piece) * dtype.itemsize, np.uint8)
+            with one_line_errors(source):
+                decode(parts, record, points, [(chunk.points, chunk.size) for chunk in piece])
+            yield points.view(dtype)
+            progress.advance(sum(chunk.size for chunk in piece))
 
 
-def _decode(
-    parts: Sequence[bytes],
-    record: bytes,
-    points: NDArray[np.uint8],
-    table: Sequence[tuple[int, int]],
-    header: LasHeader,
-) -> None:
+@contextlib.contextmanager
+def _decoding(header: LasHeader) -> Iterator[Callable[..., None]]:
+    """Give what decodes chunks: for times that may overflow the stack, in a process of its own."""
     import lazrs
 
     kind = header.point_format
-    if kind.id >= 6 or "gps_time" not in kind.dimension_names:
-        lazrs.decompress_points_with_chunk_table(b"".join(parts), record, points, list(table))
-        return
-    # lazrs reads old times by calling itself, in a damaged file very often: its threads' stacks overflow.
-    ends = np.cumsum([count * kind.size for count, _ in table])
-    jobs = [
-        (part, record, points[end - count * kind.size : end], [(count, length)])
-        for part, (count, length), end in zip(parts, table, ends, strict=True)
-    ]
-    with _DEEP, ThreadPoolExecutor(min(os.cpu_count() or 1, len(jobs))) as pool:
-        usual = threading.stack_size(STACK_BYTES)
-        try:
-            waiting = [pool.submit(lazrs.decompress_points_with_chunk_table, *job) for job in jobs]
-        finally:
-            threading.stack_size(usual)
-        for job in waiting:
-            job.result()
+    if kind.id < 6 and "gps_time" in kind.dimension_names and laz_child.is_possible():
+        with laz_child.decoder() as process:
+            yield process.decode
+    else:
+        yield lambda parts, record, points, table: lazrs.decompress_points_with_chunk_table(
+            b"".join(parts), record, points, table
+        )
 
 
 def _laszip_record(header: LasHeader, source: str) -> bytes:
