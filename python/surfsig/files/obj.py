@@ -19,7 +19,8 @@ from surfsig.point_cloud import PointCloud
 _WORDS = (
     "v", "vn", "vt", "vp", "f", "fo", "l", "p", "o", "g", "s", "mg", "mtllib", "usemtl", "maplib", "usemap",
     "bevel", "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj", "ctech", "stech", "cstype", "deg",
-    "bmat", "step", "curv", "curv2", "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con", "call", "csh",
+    "bmat", "step", "curv", "curv2", "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con", "call",
+    "csh",
 )  # fmt: skip
 _LINE = rb"[ \t]*(?:(?:" + "|".join(_WORDS).encode() + rb")(?:[ \t][^\r\n]*)?|#[^\r\n]*)?"
 _VERTEX = rb"[ \t]*v(?:[ \t]+[-+.\deE]+){3,}[ \t]*"
