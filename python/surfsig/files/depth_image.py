@@ -107,13 +107,14 @@ def _check_image(file: BinaryIO, source: str) -> None:
 def _check_data(file: BinaryIO, needed: int, source: str) -> None:
     """Make sure that the pixels are all there: Pillow leaves those that are missing 0, and says nothing."""
     inflater = zlib.decompressobj()
+    size = os.fstat(file.fileno()).st_size
     file.seek(len(MAGIC))
-    while needed > 0:
-        head = file.read(8)
-        if len(head) < 8:
-            raise FileFormatError(f"{source}: the PNG image is cut off or broken (pixels are missing)")
+    while len(head := file.read(8)) == 8:
         length, name = struct.unpack(">I4s", head)
         end = file.tell() + length + 4
+        # Pillow asks for as many bytes as a chunk says that it has.
+        if end > size:
+            raise FileFormatError(f"{source}: the PNG image is cut off or broken (a chunk is too long)")
         if name == b"IDAT":
             for start in range(0, length, _PIECE_BYTES):
                 data = file.read(min(_PIECE_BYTES, length - start))
@@ -121,6 +122,8 @@ def _check_data(file: BinaryIO, needed: int, source: str) -> None:
                     break
                 needed -= _inflated_bytes(inflater, data, needed, source)
         file.seek(end)
+    if needed > 0:
+        raise FileFormatError(f"{source}: the PNG image is cut off or broken (pixels are missing)")
 
 
 def _inflated_bytes(inflater: zlib._Decompress, data: bytes, needed: int, source: str) -> int:
