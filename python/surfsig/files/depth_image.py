@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import struct
 import warnings
@@ -163,13 +162,11 @@ def _checked(
 def _decoded(file: BinaryIO, source: str) -> NDArray[np.uint16]:
     from PIL import Image
 
-    # From a buffer: reading from a file, Python allocates whatever length a broken chunk claims to have.
-    content = io.BytesIO(file.read())
     try:
         with warnings.catch_warnings():
             # Of sizes that the data have justified, and of extras that do not touch the depths.
             warnings.simplefilter("ignore")
-            with Image.open(content, formats=["PNG"]) as image:
+            with Image.open(file, formats=["PNG"]) as image:
                 return np.asarray(image).astype(np.uint16)
     except MemoryError:
         raise
