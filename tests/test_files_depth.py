@@ -182,4 +182,4 @@ def test_a_chunk_that_claims_more_than_the_file_allocates_nothing(tmp_path: Path
     content = bytearray(png(depths(3, 4)))
     place = content.index(b"IDAT") - 4
     content[place : place + 4] = b"\xf0\x00\x00\x00"
-    assert_refused(tmp_path / "a.png", content, "a chunk is too long")
+    assert_refused(tmp_path / "a.png", bytes(content), "a chunk is too long")
