@@ -4,6 +4,7 @@ import contextlib
 import struct
 import sys
 import tracemalloc
+import warnings
 import zlib
 from pathlib import Path
 from typing import Any
@@ -149,6 +150,15 @@ def test_much_more_data_than_pixels_is_not_held(tmp_path: Path) -> None:
         tracemalloc.stop()
 
 
+def test_what_pillow_warns_of_is_no_matter(tmp_path: Path) -> None:
+    whole = png(depths(12, 15))
+    # An animation without pictures.
+    (tmp_path / "a.png").write_bytes(whole[:33] + chunk(b"acTL", bytes(8)) + whole[33:])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert read(tmp_path / "a.png", intrinsics=INTRINSICS).grid == (12, 15)
+
+
 def test_random_changes_never_crash(tmp_path: Path) -> None:
     content = png(depths(12, 15))
     rng = np.random.default_rng(37)
@@ -172,4 +182,4 @@ def test_a_chunk_that_claims_more_than_the_file_allocates_nothing(tmp_path: Path
     content = bytearray(png(depths(3, 4)))
     place = content.index(b"IDAT") - 4
     content[place : place + 4] = b"\xf0\x00\x00\x00"
-    assert_refused(tmp_path / "a.png", content, "a chunk is too long")
+    assert_refused(tmp_path / "a.png", bytes(content), "a chunk is too long")

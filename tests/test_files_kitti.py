@@ -37,6 +37,12 @@ def test_text_called_bin_stays_text(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read(path).points, [[1, 2, 3.5], [4, 5, 6.5]])
 
 
+def test_zeros_called_bin_are_no_scan(tmp_path: Path) -> None:
+    (tmp_path / "a.bin").write_bytes(bytes(160))
+    with pytest.raises(FileFormatError, match="is not a KITTI file"):
+        read(tmp_path / "a.bin")
+
+
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e6, -2e6])
 @pytest.mark.parametrize(("place", "message"), [(3, "is not a KITTI file"), (9_000, "is not a KITTI scan")])
 def test_values_that_make_no_sense(tmp_path: Path, place: int, message: str, value: float) -> None:

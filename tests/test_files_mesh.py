@@ -214,6 +214,7 @@ def assert_refused(path: Path, content: bytes | str, message: str) -> None:
         (OBJ + "v 1 2 1e300\n", "a vertex is no number, or beyond"),
         (OBJ + "v\n", "some without numbers"),
         (OBJ + "vn 1 2\n", "line 9: 2 values where 3 are expected"),
+        (OBJ + "w 1 2 3\n", "line 9 is none of OBJ's: 'w 1 2 3'"),
         ("# nothing\n", "has no vertices"),
     ],
 )
@@ -234,6 +235,8 @@ def test_broken_stl(tmp_path: Path) -> None:
     assert_refused(path, text.replace(b"vertex 2.0", b"vertex nan", 1), "a vertex is no number")
     for length in range(text.index(b"vertex 0"), len(text) - 3, 7):
         assert_refused(path, text[:length], "cut off or broken|is expected|are expected|not a number")
+    second = text.index(b"facet normal", text.index(b"endfacet"))
+    assert_refused(path, text + text[:second], "2 solids begin, 1 end")
 
 
 @pytest.mark.parametrize("name", CONTENTS)

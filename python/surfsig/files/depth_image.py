@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
+import warnings
 import zlib
 from numbers import Real
 from typing import BinaryIO
@@ -162,8 +163,11 @@ def _decoded(file: BinaryIO, source: str) -> NDArray[np.uint16]:
     from PIL import Image
 
     try:
-        with Image.open(file, formats=["PNG"]) as image:
-            return np.asarray(image).astype(np.uint16)
+        with warnings.catch_warnings():
+            # Of sizes that the data have justified, and of extras that do not touch the depths.
+            warnings.simplefilter("ignore")
+            with Image.open(file, formats=["PNG"]) as image:
+                return np.asarray(image).astype(np.uint16)
     except MemoryError:
         raise
     # Pillow's chunks and zlib raise whatever they like: SyntaxError, struct.error, OSError, ValueError.

@@ -20,8 +20,9 @@ _FARTHEST = 1e6
 
 def is_plausible(head: bytes, size: int) -> bool:
     """Tell whether a file of `size` bytes that begins so may be such a scan."""
-    whole = len(head) // _POINT_BYTES * _POINT_BYTES
-    return whole > 0 and size % _POINT_BYTES == 0 and _are_points(_rows(head[:whole]))
+    rows = _rows(head[: len(head) // _POINT_BYTES * _POINT_BYTES])
+    # Nothing but zeros is a file that was never filled.
+    return size % _POINT_BYTES == 0 and bool(rows.any()) and _are_points(rows)
 
 
 def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:

@@ -16,7 +16,13 @@ from surfsig.files.lines import Block, fault, line_blocks, parse, tokens_of, war
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
-_LINE = rb"[ \t]*(?:(?:v|vn|vt|vp|f|l|p|o|g|s|mtllib|usemtl|usemap)(?:[ \t][^\r\n]*)?|#[^\r\n]*)?"
+_WORDS = (
+    "v", "vn", "vt", "vp", "f", "fo", "l", "p", "o", "g", "s", "mg", "mtllib", "usemtl", "maplib", "usemap",
+    "bevel", "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj", "ctech", "stech", "cstype", "deg",
+    "bmat", "step", "curv", "curv2", "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con", "call",
+    "csh",
+)  # fmt: skip
+_LINE = rb"[ \t]*(?:(?:" + "|".join(_WORDS).encode() + rb")(?:[ \t][^\r\n]*)?|#[^\r\n]*)?"
 _VERTEX = rb"[ \t]*v(?:[ \t]+[-+.\deE]+){3,}[ \t]*"
 # Whole lines of OBJ's words, of which one is a vertex.
 MAGIC = re.compile(rb"(?:\xef\xbb\xbf)?(?:" + _LINE + rb"[\r\n])*?" + _VERTEX + rb"(?:[\r\n]|$)")
@@ -94,6 +100,10 @@ class _Parts:
                 rows[word][number] = rest
             elif word == "f":
                 triangles += self._face(rest, block.first + number)
+            elif word and not word.startswith("#") and word not in _WORDS:
+                raise FileFormatError(
+                    f"{self._source}: line {block.first + number} is none of OBJ's: {line.strip()[:40]!r}"
+                )
         if triangles:
             self._triangles.append(np.array(triangles, np.intp).reshape(-1, 3))
         self._add_numbers(rows["v"], block.first)

@@ -20,7 +20,7 @@ ASCII_MAGIC = re.compile(rb"\s*solid\b.*?\b(facet|endsolid)\b", re.IGNORECASE | 
 _HEADER_BYTES = 84
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _BLOCK_FACETS = 1 << 16
-_WORD = re.compile(r"\s*(facet|vertex|endfacet|endsolid)\b(.*)", re.IGNORECASE)
+_WORD = re.compile(r"\s*(solid|facet|vertex|endfacet|endsolid)\b(.*)", re.IGNORECASE)
 
 
 def is_whole_binary(head: bytes, size: int) -> bool:
@@ -38,7 +38,7 @@ def read_ascii(file: BinaryIO, source: str, progress: Progress, samples: int | N
         If it is cut off or broken; the message names the line.
     """
     corners = [np.empty((0, 3))]
-    words = {"facet": 0, "vertex": 0, "endfacet": 0, "endsolid": 0}
+    words = {"solid": 0, "facet": 0, "vertex": 0, "endfacet": 0, "endsolid": 0}
     for block in line_blocks(file, 1, progress):
         vertices = []
         for line in block.lines:
@@ -53,10 +53,14 @@ def read_ascii(file: BinaryIO, source: str, progress: Progress, samples: int | N
             vertices.append("")
         corners.append(parse(vertices, np.float64, 3, source=source, first=block.first))
     facets, count = words["facet"], sum(map(len, corners))
-    if not words["endsolid"] or words["endfacet"] != facets or not words["vertex"] == count == 3 * facets:
+    if words["endfacet"] != facets or not words["vertex"] == count == 3 * facets:
         raise FileFormatError(
             f"{source}: cut off or broken: {facets} facets begin, {words['endfacet']} end, and they have "
             f"{count} vertices"
+        )
+    if words["solid"] != words["endsolid"]:
+        raise FileFormatError(
+            f"{source}: cut off or broken: {words['solid']} solids begin, {words['endsolid']} end"
         )
     return _cloud(np.concatenate(corners), source, samples)
 
