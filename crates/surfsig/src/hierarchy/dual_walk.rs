@@ -19,17 +19,18 @@ use crate::simd::split::{QueryCube, Rim, split};
 use std::ops::Range;
 
 /// Points of a cube of queries that is not cut any further.
-const QUERY_LEAF: usize = 12;
+static SRC: std::sync::LazyLock<usize> = std::sync::LazyLock::new(|| std::env::var("SRC").map_or(12, |v| v.parse().unwrap()));
+static QLEAFV: std::sync::LazyLock<usize> = std::sync::LazyLock::new(|| std::env::var("QLEAF").map_or(12, |v| v.parse().unwrap()));
 
 /// A small cube of queries: what its balls share, and what each must look at.
 struct QueryLeaf {
-    /// Sums of what is inside all balls, about the cube's centre.
-    core: Moments<f64>,
+    /// Sums of the ball around the cube's centre, about it.
+    base: Moments<f64>,
     /// The centre, from the middle of the queries' row, in units of the radius.
     centre: [f64; 3],
-    /// What may be on the rims, row by row.
-    rim: Rim,
-    windows: Vec<Window>,
+    /// Points about which the balls may disagree, row by row: those in the base, and those that are not.
+    rims: [Rim; 2],
+    windows: [Vec<Window>; 2],
 }
 
 /// A cube of queries that waits to be walked.
@@ -84,10 +85,10 @@ impl<'a> HierarchicalWalk<'a> {
             compared: Vec::new(),
             inside: Vec::new(),
             leaves: std::array::from_fn(|_| QueryLeaf {
-                core: Moments::default(),
+                base: Moments::default(),
                 centre: [0.0; 3],
-                rim: Rim::default(),
-                windows: Vec::new(),
+                rims: Default::default(),
+                windows: Default::default(),
             }),
             last: 0,
             block: Box::new(Block::new()),
@@ -134,7 +135,7 @@ impl<'a> HierarchicalWalk<'a> {
             // What lies beyond belongs to cubes that are done.
             self.near.truncate(frame.near.end);
             let node = frame.node.map(|node| &self.forest.nodes[node as usize]);
-            let cut = node.filter(|node| !node.is_leaf() && node.points().len() > QUERY_LEAF);
+            let cut = node.filter(|node| !node.is_leaf() && node.points().len() > *QLEAFV);
             let children = cut.map(|node| node.children());
             // A last cube leaves nothing that could be cut.
             let smallest = if children.is_some() { frame.cube.size } else { 1 };
@@ -175,7 +176,7 @@ impl<'a> HierarchicalWalk<'a> {
             self.sift(frame.cube);
             // Those that must be cut are replaced by their children, so that the order stays.
             let is_whole = |source: &Source| {
-                source.cube.size < smallest || self.forest.nodes[source.node as usize].is_leaf()
+                source.cube.size < smallest || self.forest.nodes[source.node as usize].is_leaf() || self.forest.nodes[source.node as usize].points().len() <= *SRC
             };
             if self.near[start..].iter().all(is_whole) {
                 break;
@@ -225,11 +226,10 @@ impl<'a> HierarchicalWalk<'a> {
         let half = 0.5 * f64::from(frame.cube.size);
         let from_region = frame.cube.low.map(|low| self.forest.from_middle(f64::from(low) + half));
         leaf.centre = [0, 1, 2].map(|axis| from_region[axis] - self.middle[axis]);
-        leaf.core.sums = frame.core;
-        leaf.core = leaf.core.shifted(from_region.map(|c| -c));
-        leaf.windows.clear();
-        leaf.rim.len = 0;
-        let mut inside = BlockSums::<f64>::new(self.set);
+        leaf.base = Moments { sums: frame.core }.shifted(from_region.map(|c| -c));
+        leaf.windows.iter_mut().for_each(Vec::clear);
+        leaf.rims.iter_mut().for_each(|rim| rim.len = 0);
+        let mut base = BlockSums::<f64>::new(self.set);
         self.block.len = 0;
         let points = self.forest.points();
         let near = &self.near[frame.near.clone()];
@@ -242,24 +242,26 @@ impl<'a> HierarchicalWalk<'a> {
                 shift: [0, 1, 2].map(|axis| (between[axis] - leaf.centre[axis]) as f32),
                 half: self.forest.units(half) as f32,
             };
-            let first = leaf.rim.len;
+            let first = [leaf.rims[0].len, leaf.rims[1].len];
             // Neighbouring leaves have neighbouring points.
             let adjoin = |a: &Source, b: &Source| nodes[a.node as usize].end_point == nodes[b.node as usize].first_point;
             for run in row.chunk_by(adjoin) {
                 let (from, to) = (nodes[run[0].node as usize].points().start, nodes[run[run.len() - 1].node as usize].points().end);
                 for start in (from..to).step_by(PIECE) {
                     let ranks = start..to.min(start + PIECE);
-                    split(self.set, points, ranks, cube, &mut self.block, &mut leaf.rim);
+                    split(self.set, points, ranks, cube, &mut self.block, &mut leaf.rims);
                     while self.block.len >= BLOCK {
-                        inside.visit(&self.block, BLOCK);
+                        base.visit(&self.block, BLOCK);
                         self.block.carry_over();
                     }
                 }
             }
-            leaf.windows.push(Window { ranks: first..leaf.rim.len, between });
+            for (side, first) in first.into_iter().enumerate() {
+                leaf.windows[side].push(Window { ranks: first..leaf.rims[side].len, between });
+            }
         }
-        finish(&mut self.block, &mut inside);
-        leaf.core += inside.total;
+        finish(&mut self.block, &mut base);
+        leaf.base += base.total;
         self.last
     }
 
@@ -267,9 +269,14 @@ impl<'a> HierarchicalWalk<'a> {
     pub fn moments<S: Scalar>(&mut self, slot: usize, offset: [f32; 3]) -> Moments<f64> {
         let leaf = &self.leaves[slot];
         let ball = Ball::around(offset, self.scale, &self.index.lattice);
-        let mut rim = BlockSums::<S>::new(self.set);
-        let rows = Rows { x: &leaf.rim.x, y: &leaf.rim.y, z: &leaf.rim.z };
-        visit_members(self.set, rows, &leaf.windows, ball, &mut self.block, &mut rim);
-        leaf.core.shifted([0, 1, 2].map(|axis| leaf.centre[axis] - ball.query[axis])) + rim.total
+        let (mut less, mut more) = (BlockSums::<S>::new(self.set), BlockSums::<S>::new(self.set));
+        let [inner, outer] = leaf.rims.each_ref().map(|rim| Rows { x: &rim.x, y: &rim.y, z: &rim.z });
+        let (set, [in_base, others]) = (self.set, &leaf.windows);
+        visit_members::<_, true>(set, inner, in_base, ball, &mut self.block, &mut less);
+        visit_members::<_, false>(set, outer, others, ball, &mut self.block, &mut more);
+        let mut moments = leaf.base.shifted([0, 1, 2].map(|axis| leaf.centre[axis] - ball.query[axis]));
+        moments += more.total;
+        moments -= less.total;
+        moments
     }
 }

@@ -20,7 +20,7 @@ const MARGIN: i64 = 3;
 const WIDTH: i64 = CELLS_PER_REGION + 2 * MARGIN;
 
 /// Points of a cube that is not cut any further.
-const LEAF: usize = 12;
+static LEAFV: std::sync::LazyLock<usize> = std::sync::LazyLock::new(|| std::env::var("LEAF").map_or(12, |v| v.parse().unwrap()));
 
 /// A cube of a tree, and the points in it.
 pub(super) struct Node {
@@ -244,7 +244,7 @@ impl<'a> Forest<'a> {
     /// Gives a node its children.
     fn cut(&mut self, node: usize, first_point: u32) {
         let Node { cube, row, first_point: first, end_point: end, .. } = self.nodes[node];
-        if (end - first) as usize <= LEAF || cube.size == 1 {
+        if (end - first) as usize <= *LEAFV || cube.size == 1 {
             return;
         }
         let first_child = self.nodes.len() as u32;
