@@ -84,12 +84,12 @@ impl<'a> DirectWalk<'a> {
     pub fn visit<V: BallVisitor>(&mut self, offset: [f32; 3], visitor: &mut V) {
         let CellIndex { x, y, z, lattice, .. } = self.index;
         let ball = Ball::around(offset, self.scale, lattice);
-        visit_members::<V, false>(self.set, Rows { x, y, z }, &self.windows, ball, &mut self.block, visitor);
+        visit_members(self.set, Rows { x, y, z }, &self.windows, ball, &mut self.block, visitor);
     }
 }
 
-/// Shows a visitor those points of the windows that are in the ball, or, where `BEYOND` is set, the others.
-pub(crate) fn visit_members<V: BallVisitor, const BEYOND: bool>(
+/// Shows a visitor those points of the windows that are in the ball.
+pub(crate) fn visit_members<V: BallVisitor>(
     set: InstructionSet,
     rows: Rows<'_>,
     windows: &[Window],
@@ -101,9 +101,9 @@ pub(crate) fn visit_members<V: BallVisitor, const BEYOND: bool>(
     block.len = 0;
     loop {
         let finished = if V::WANTS_RANKS {
-            gather::<true, BEYOND>(set, rows, windows, ball, block, &mut place)
+            gather::<true>(set, rows, windows, ball, block, &mut place)
         } else {
-            gather::<false, BEYOND>(set, rows, windows, ball, block, &mut place)
+            gather::<false>(set, rows, windows, ball, block, &mut place)
         };
         while block.len >= BLOCK {
             visitor.visit(block, BLOCK);

@@ -213,14 +213,6 @@ impl<S: Scalar> std::ops::AddAssign for Moments<S> {
     }
 }
 
-impl<S: Scalar> std::ops::SubAssign for Moments<S> {
-    fn sub_assign(&mut self, other: Self) {
-        for (sum, less) in self.sums.iter_mut().zip(other.sums) {
-            *sum = *sum - less;
-        }
-    }
-}
-
 impl<S: Scalar> std::ops::Add for Moments<S> {
     type Output = Self;
     fn add(mut self, other: Self) -> Self {

@@ -104,9 +104,9 @@ struct Placement {
 }
 
 /// Appends members of the ball to `block`, from `place` on, until the block holds [`BLOCK`] of them or
-/// more (`false`) or the windows are at their end (`true`). `BEYOND` wants those that are not members.
+/// more (`false`) or the windows are at their end (`true`).
 #[inline]
-pub(crate) fn gather<const RANKS: bool, const BEYOND: bool>(
+pub(crate) fn gather<const RANKS: bool>(
     set: InstructionSet,
     rows: Rows<'_>,
     windows: &[Window],
@@ -115,21 +115,19 @@ pub(crate) fn gather<const RANKS: bool, const BEYOND: bool>(
     place: &mut Place,
 ) -> bool {
     match set.0 {
-        Kind::Baseline => {
-            gather_by::<BEYOND>(rows, windows, ball, block, place, select_baseline::<RANKS, BEYOND>)
-        },
+        Kind::Baseline => gather_by(rows, windows, ball, block, place, select_baseline::<RANKS>),
         // SAFETY: the value of `set` proves AVX2, FMA and POPCNT.
         #[cfg(target_arch = "x86_64")]
-        Kind::Avx2 => unsafe { x86::gather_avx2::<RANKS, BEYOND>(rows, windows, ball, block, place) },
+        Kind::Avx2 => unsafe { x86::gather_avx2::<RANKS>(rows, windows, ball, block, place) },
         // SAFETY: the value of `set` proves AVX-512 F and POPCNT.
         #[cfg(target_arch = "x86_64")]
-        Kind::Avx512 => unsafe { x86::gather_avx512::<RANKS, BEYOND>(rows, windows, ball, block, place) },
+        Kind::Avx512 => unsafe { x86::gather_avx512::<RANKS>(rows, windows, ball, block, place) },
     }
 }
 
 /// The walk from window to window; `select` appends the members among some ranks of one row.
 #[inline(always)]
-fn gather_by<const BEYOND: bool>(
+fn gather_by(
     rows: Rows<'_>,
     windows: &[Window],
     ball: Ball,
@@ -145,7 +143,7 @@ fn gather_by<const BEYOND: bool>(
         }
         let gap_y = (shift[1].abs() - ball.half_step).max(0.0);
         let gap_z = (shift[2].abs() - ball.half_step).max(0.0);
-        if BEYOND || gap_y * gap_y + gap_z * gap_z <= BALL_LIMIT {
+        if gap_y * gap_y + gap_z * gap_z <= BALL_LIMIT {
             let placement = Placement { scale: ball.scale, shift };
             let mut start = window.ranks.start.max(place.rank);
             while start < window.ranks.end {
@@ -167,7 +165,7 @@ fn gather_by<const BEYOND: bool>(
 /// Eight distances at a time, which the compiler vectorises; then a store of every point, of which
 /// the next overwrites those that are outside.
 #[inline(always)]
-fn select_baseline<const RANKS: bool, const BEYOND: bool>(
+fn select_baseline<const RANKS: bool>(
     rows: Rows<'_>,
     ranks: std::ops::Range<usize>,
     placement: Placement,
@@ -182,7 +180,7 @@ fn select_baseline<const RANKS: bool, const BEYOND: bool>(
         let z: [f32; WIDTH] = std::array::from_fn(|l| lane(rows.z, l, 2));
         let inside: [bool; WIDTH] = std::array::from_fn(|l| {
             let square = z[l].mul_add(z[l], y[l].mul_add(y[l], x[l] * x[l]));
-            (square <= BALL_LIMIT) != BEYOND && start + l < ranks.end
+            square <= BALL_LIMIT && start + l < ranks.end
         });
         for l in 0..WIDTH {
             block.x[block.len] = x[l];
@@ -222,31 +220,31 @@ mod x86 {
     use std::ops::Range;
 
     #[target_feature(enable = "avx2,fma,popcnt")]
-    pub(super) fn gather_avx2<const RANKS: bool, const BEYOND: bool>(
+    pub(super) fn gather_avx2<const RANKS: bool>(
         rows: Rows<'_>,
         windows: &[Window],
         ball: Ball,
         block: &mut Block,
         place: &mut Place,
     ) -> bool {
-        gather_by::<BEYOND>(rows, windows, ball, block, place, |rows, ranks, placement, block| {
+        gather_by(rows, windows, ball, block, place, |rows, ranks, placement, block| {
             // SAFETY: `gather_by` checks that the rows are readable for 16 slots beyond the ranks, of
             // which it hands on at most `PIECE`, and only while the block holds less than `BLOCK`.
-            unsafe { select_avx2::<RANKS, BEYOND>(rows, ranks, placement, block) }
+            unsafe { select_avx2::<RANKS>(rows, ranks, placement, block) }
         })
     }
 
     #[target_feature(enable = "avx512f,avx512vl,avx2,fma,popcnt")]
-    pub(super) fn gather_avx512<const RANKS: bool, const BEYOND: bool>(
+    pub(super) fn gather_avx512<const RANKS: bool>(
         rows: Rows<'_>,
         windows: &[Window],
         ball: Ball,
         block: &mut Block,
         place: &mut Place,
     ) -> bool {
-        gather_by::<BEYOND>(rows, windows, ball, block, place, |rows, ranks, placement, block| {
+        gather_by(rows, windows, ball, block, place, |rows, ranks, placement, block| {
             // SAFETY: as in `gather_avx2`.
-            unsafe { select_avx512::<RANKS, BEYOND>(rows, ranks, placement, block) }
+            unsafe { select_avx512::<RANKS>(rows, ranks, placement, block) }
         })
     }
 
@@ -255,7 +253,7 @@ mod x86 {
     /// BLOCK`, so that every store ends inside the block's arrays.
     #[inline]
     #[target_feature(enable = "avx2,fma,popcnt")]
-    unsafe fn select_avx2<const RANKS: bool, const BEYOND: bool>(
+    unsafe fn select_avx2<const RANKS: bool>(
         rows: Rows<'_>,
         ranks: Range<usize>,
         placement: Placement,
@@ -274,12 +272,7 @@ mod x86 {
             let y = _mm256_fmadd_ps(_mm256_loadu_ps(rows.y.as_ptr().add(start)), scale, sy);
             let z = _mm256_fmadd_ps(_mm256_loadu_ps(rows.z.as_ptr().add(start)), scale, sz);
             let square = _mm256_fmadd_ps(z, z, _mm256_fmadd_ps(y, y, _mm256_mul_ps(x, x)));
-            let members = if BEYOND {
-                _mm256_cmp_ps::<_CMP_GT_OQ>(square, limit)
-            } else {
-                _mm256_cmp_ps::<_CMP_LE_OQ>(square, limit)
-            };
-            let mask = _mm256_movemask_ps(members) as usize & valid;
+            let mask = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(square, limit)) as usize & valid;
             let pack = _mm256_loadu_si256(PACK_LEFT.get_unchecked(mask).as_ptr().cast());
             _mm256_storeu_ps(block.x.as_mut_ptr().add(end), _mm256_permutevar8x32_ps(x, pack));
             _mm256_storeu_ps(block.y.as_mut_ptr().add(end), _mm256_permutevar8x32_ps(y, pack));
@@ -306,7 +299,7 @@ mod x86 {
     /// As [`select_avx2`].
     #[inline]
     #[target_feature(enable = "avx512f,avx512vl,avx2,fma,popcnt")]
-    unsafe fn select_avx512<const RANKS: bool, const BEYOND: bool>(
+    unsafe fn select_avx512<const RANKS: bool>(
         rows: Rows<'_>,
         ranks: Range<usize>,
         placement: Placement,
@@ -324,11 +317,7 @@ mod x86 {
             let y = _mm512_fmadd_ps(_mm512_loadu_ps(rows.y.as_ptr().add(start)), scale, sy);
             let z = _mm512_fmadd_ps(_mm512_loadu_ps(rows.z.as_ptr().add(start)), scale, sz);
             let square = _mm512_fmadd_ps(z, z, _mm512_fmadd_ps(y, y, _mm512_mul_ps(x, x)));
-            let mask = if BEYOND {
-                _mm512_mask_cmp_ps_mask::<_CMP_GT_OQ>(valid, square, limit)
-            } else {
-                _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(valid, square, limit)
-            };
+            let mask = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(valid, square, limit);
             _mm512_storeu_ps(block.x.as_mut_ptr().add(end), _mm512_maskz_compress_ps(mask, x));
             _mm512_storeu_ps(block.y.as_mut_ptr().add(end), _mm512_maskz_compress_ps(mask, y));
             _mm512_storeu_ps(block.z.as_mut_ptr().add(end), _mm512_maskz_compress_ps(mask, z));
