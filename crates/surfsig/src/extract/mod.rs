@@ -219,7 +219,7 @@ struct Pending {
     key: RowKey,
     offset: [f32; 3],
     /// Where the hierarchical walk keeps what it shares with other queries.
-    leaf: Option<usize>,
+    patch: Option<usize>,
     /// Where its values belong in the thread's part of the columns.
     entry: usize,
     /// Its number among the queries.
@@ -305,7 +305,7 @@ impl<'a> Worker<'a> {
             };
             let query = self.asked.point_of_rank[rank];
             let entry = entry + rank - start;
-            self.pending.push(Pending { key, offset, leaf: None, entry, query, radius });
+            self.pending.push(Pending { key, offset, patch: None, entry, query, radius });
             self.moments.push(moments);
             if self.pending.len() == LANES && self.fit_pending(part) {
                 // The walk went back to points of the batch.
@@ -345,9 +345,9 @@ impl<'a> Worker<'a> {
         let weak = |lane: &usize| !self.exact() && fits.needs_f64.get(*lane);
         let again: Vec<usize> = (0..self.pending.len()).filter(weak).collect();
         for &lane in &again {
-            let Pending { key, offset, leaf, .. } = self.pending[lane];
-            self.moments[lane] = match leaf {
-                Some(leaf) => self.hierarchical.moments::<f64>(leaf, offset),
+            let Pending { key, offset, patch, .. } = self.pending[lane];
+            self.moments[lane] = match patch {
+                Some(patch) => self.hierarchical.moments::<f64>(patch, offset),
                 None => {
                     self.walk.enter_row(key);
                     self.walk.enter_run(offset, offset);

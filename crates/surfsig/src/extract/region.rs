@@ -22,29 +22,29 @@ impl Worker<'_> {
         let mut first = 0;
         for DenseCell { key, cell, ranks } in cells {
             self.hierarchical.enter_cell(*key, *cell, ranks.clone().map(offset));
-            while let Some((leaf, queries)) = self.hierarchical.next_leaf() {
+            while let Some((patch, queries)) = self.hierarchical.next_patch() {
                 monitor.check()?;
-                monitor.add(queries.len());
-                for query in queries {
+                for query in queries.clone() {
                     let number = self.hierarchical.number(query);
                     let rank = ranks.start + number;
                     self.pending.push(Pending {
                         key: *key,
                         offset: offset(rank),
-                        leaf: Some(leaf),
+                        patch: Some(patch),
                         entry: first + number,
                         query: self.asked.point_of_rank[rank],
                         radius: 1.0,
                     });
                     self.moments.push(if self.exact() {
-                        self.hierarchical.moments::<f64>(leaf, offset(rank))
+                        self.hierarchical.moments::<f64>(patch, offset(rank))
                     } else {
-                        self.hierarchical.moments::<f32>(leaf, offset(rank))
+                        self.hierarchical.moments::<f32>(patch, offset(rank))
                     });
                     if self.pending.len() == LANES {
                         self.fit_pending(part);
                     }
                 }
+                monitor.add(queries.len());
             }
             first += ranks.len();
         }

@@ -1,7 +1,7 @@
 //! The queries cut into shares, each for one thread at a time.
 
 use crate::cell_index::{CELLS_PER_ROW, CellIndex, Row, RowKey};
-use crate::hierarchy::{CELLS_PER_REGION, is_dense};
+use crate::hierarchy::{CELLS_PER_REGION, DENSE};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
@@ -75,7 +75,8 @@ pub(super) fn shares(index: &CellIndex, asked: &CellIndex, hierarchy: bool) -> V
     shares
 }
 
-/// The dense cells of a row in which there are queries.
+/// The dense cells of a row in which there are queries. What is dense follows from a cell's own points: a tile
+/// decides as the whole cloud does, and for some queries as for all.
 fn dense_cells(index: &CellIndex, asked: &CellIndex, row: &Row) -> Vec<DenseCell> {
     let lattice = &index.lattice;
     let mut cells = Vec::new();
@@ -89,7 +90,7 @@ fn dense_cells(index: &CellIndex, asked: &CellIndex, row: &Row) -> Vec<DenseCell
         let ranks = query..after(&asked.x, query, row.end, cell);
         point = after(&index.x, point, points.end, cell - 1);
         let end = after(&index.x, point, points.end, cell);
-        if is_dense(index, point..end) {
+        if end - point >= DENSE {
             cells.push(DenseCell { key: row.key, cell, ranks: ranks.clone() });
         }
         (query, point) = (ranks.end, end);

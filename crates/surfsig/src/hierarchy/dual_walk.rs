@@ -7,7 +7,7 @@
 //! of every ball are the same.
 
 use super::cube::{Cube, Relation};
-use super::forest::{Forest, Source, add, octant, place_on_curve};
+use super::forest::{Forest, Node, Source, add, octant, place_on_curve};
 use crate::ball::{BallVisitor, finish, visit_members};
 use crate::block_sums::BlockSums;
 use crate::cell_index::{CellIndex, PARTS_PER_CELL, RowKey};
@@ -18,16 +18,17 @@ use crate::simd::select::{BLOCK, Ball, Block, PIECE, Rows, Window};
 use crate::simd::split::{QueryCube, Rim, split};
 use std::ops::Range;
 
-/// Points of a cube of queries that is not cut any further.
-const QUERY_LEAF: usize = 12;
+/// Points of a cube of queries beyond which it is cut once more after its patch is prepared.
+const MANY: usize = 12;
 
-/// A small cube of queries: what its balls share, and what each must look at.
-struct QueryLeaf {
-    /// Sums of what is inside all balls, about the cube's centre.
-    core: Moments<f64>,
-    /// The centre, from the middle of the queries' row, in units of the radius.
+/// A cube of queries: what its balls share, and what each must look at.
+struct Patch {
+    cube: Cube,
+    /// The cube's centre, from the middle of the queries' row, in units of the radius.
     centre: [f64; 3],
-    /// What may be on the rims, row by row.
+    /// Sums of the points that are in all balls, about the centre.
+    shared: Moments<f64>,
+    /// The points that may be in some, row by row.
     rim: Rim,
     windows: Vec<Window>,
 }
@@ -61,8 +62,11 @@ pub(crate) struct HierarchicalWalk<'a> {
     compared: Vec<Source>,
     /// Nodes inside all balls of the present cube of queries.
     inside: Vec<u32>,
-    /// The last leaves: as many as a batch of fits may come back to.
-    leaves: [QueryLeaf; LANES],
+    /// The present patch, and those octants of it that have yet to be prepared, with their queries.
+    patch: Patch,
+    octants: Vec<(Cube, Range<usize>)>,
+    /// The last patches that were handed out: as many as a batch of fits may come back to.
+    last_patches: [Patch; LANES],
     last: usize,
     block: Box<Block>,
 }
@@ -83,12 +87,9 @@ impl<'a> HierarchicalWalk<'a> {
             near: Vec::new(),
             compared: Vec::new(),
             inside: Vec::new(),
-            leaves: std::array::from_fn(|_| QueryLeaf {
-                core: Moments::default(),
-                centre: [0.0; 3],
-                rim: Rim::default(),
-                windows: Vec::new(),
-            }),
+            patch: Patch::new(),
+            octants: Vec::new(),
+            last_patches: std::array::from_fn(|_| Patch::new()),
             last: 0,
             block: Box::new(Block::new()),
         }
@@ -127,35 +128,47 @@ impl<'a> HierarchicalWalk<'a> {
         });
     }
 
-    /// Prepares the cell's next leaf. Gives its slot, good until [`LANES`] more leaves are prepared, and
-    /// which of the cell's queries are in it.
-    pub fn next_leaf(&mut self) -> Option<(usize, Range<usize>)> {
+    /// Prepares the cell's next patch. Gives its slot, good until [`LANES`] more are prepared, and which of the
+    /// cell's queries are in it.
+    pub fn next_patch(&mut self) -> Option<(usize, Range<usize>)> {
+        if self.octants.is_empty() {
+            self.walk_to_patch()?;
+        }
+        let (cube, queries) = self.octants.pop()?;
+        self.last = (self.last + 1) % LANES;
+        if cube == self.patch.cube {
+            std::mem::swap(&mut self.patch, &mut self.last_patches[self.last]);
+        } else {
+            self.refine(cube);
+        }
+        Some((self.last, queries))
+    }
+
+    /// Walks on until a cube of queries needs no more cutting, and prepares it.
+    fn walk_to_patch(&mut self) -> Option<()> {
         while let Some(mut frame) = self.frames.pop() {
             // What lies beyond belongs to cubes that are done.
             self.near.truncate(frame.near.end);
+            self.compare(&mut frame);
             let node = frame.node.map(|node| &self.forest.nodes[node as usize]);
-            let cut = node.filter(|node| !node.is_leaf() && node.points().len() > QUERY_LEAF);
-            let children = cut.map(|node| node.children());
-            // A last cube leaves nothing that could be cut.
-            let smallest = if children.is_some() { frame.cube.size } else { 1 };
-            self.compare(&mut frame, smallest);
-            let Some(children) = children else {
-                let slot = self.pack(&frame);
-                return Some((slot, frame.queries));
-            };
-            let (size, mut end) = (frame.cube.size, frame.queries.end);
-            while end > frame.queries.start {
-                let octant_of = |query: u64| octant(query >> 32, size);
-                let number = octant_of(self.queries[end - 1]);
-                let before =
-                    self.queries[frame.queries.start..end].partition_point(|&q| octant_of(q) < number);
-                let start = frame.queries.start + before;
-                let cube = frame.cube.octant(number);
-                let node = children.clone().find(|&child| self.forest.nodes[child as usize].cube == cube);
-                let (near, core) = (frame.near.clone(), frame.core);
-                self.frames.push(Frame { cube, node, queries: start..end, near, core });
-                end = start;
+            let children = node.filter(|node| !node.is_small()).map(Node::children);
+            let points = node.map_or(0, |node| node.points().len());
+            if let Some(children) = children {
+                for (cube, queries) in octants_of(&self.queries, frame.cube, frame.queries.clone()) {
+                    let same = |child: &u32| self.forest.nodes[*child as usize].cube == cube;
+                    let node = children.clone().find(same);
+                    let (near, core) = (frame.near.clone(), frame.core);
+                    self.frames.push(Frame { cube, node, queries, near, core });
+                }
+                continue;
             }
+            self.prepare(&frame);
+            if points > MANY && frame.cube.size > 1 {
+                self.octants.extend(octants_of(&self.queries, frame.cube, frame.queries));
+            } else {
+                self.octants.push((frame.cube, frame.queries));
+            }
+            return Some(());
         }
         None
     }
@@ -166,28 +179,27 @@ impl<'a> HierarchicalWalk<'a> {
     }
 
     /// Compares a cube of queries with what was near to the larger one. Cubes of points are cut until they are
-    /// leaves, or smaller than `smallest`.
-    fn compare(&mut self, frame: &mut Frame, smallest: i16) {
+    /// no larger than this one.
+    fn compare(&mut self, frame: &mut Frame) {
         let start = self.near.len();
         self.compared.clear();
         self.compared.extend_from_slice(&self.near[frame.near.clone()]);
         self.inside.clear();
         loop {
             self.sift(frame.cube);
-            // Those that must be cut are replaced by their children, so that the order stays.
-            let is_whole = |source: &Source| {
-                source.cube.size < smallest || self.forest.nodes[source.node as usize].is_leaf()
-            };
+            let is_whole = |source: &Source| source.cube.size <= frame.cube.size;
             if self.near[start..].iter().all(is_whole) {
                 break;
             }
+            // Those that must be cut are replaced by their children, so that the order stays.
             self.compared.clear();
             for source in &self.near[start..] {
                 if is_whole(source) {
                     self.compared.push(*source);
                 } else {
-                    let children = self.forest.nodes[source.node as usize].children();
-                    self.compared.extend(children.map(|node| self.forest.source(node)));
+                    for child in self.forest.children(source.node) {
+                        self.compared.push(self.forest.source(child));
+                    }
                 }
             }
             self.near.truncate(start);
@@ -217,65 +229,143 @@ impl<'a> HierarchicalWalk<'a> {
         self.inside.truncate(inside);
     }
 
-    /// Looks at the single points of what is near to a leaf: adds what is inside all balls, and packs the rest.
-    fn pack(&mut self, frame: &Frame) -> usize {
-        self.last = (self.last + 1) % LANES;
-        let leaf = &mut self.leaves[self.last];
-        let lattice = &self.index.lattice;
-        let units = f64::from(self.scale);
+    /// Looks at the single points of the cubes that are near to one of queries.
+    fn prepare(&mut self, frame: &Frame) {
+        let (forest, nodes, lattice) = (&self.forest, &self.forest.nodes, &self.index.lattice);
         let half = 0.5 * f64::from(frame.cube.size);
-        let from_region = frame.cube.low.map(|low| self.forest.from_middle(f64::from(low) + half));
-        leaf.centre = [0, 1, 2].map(|axis| from_region[axis] - self.middle[axis]);
-        leaf.core.sums = frame.core;
-        leaf.core = leaf.core.shifted(from_region.map(|c| -c));
-        leaf.windows.clear();
-        leaf.rim.len = 0;
-        let mut inside = BlockSums::<f64>::new(self.set);
-        self.block.len = 0;
-        let points = self.forest.points();
+        let centre = frame.cube.low.map(|low| forest.beyond_middle(f64::from(low) + half));
+        let patch = &mut self.patch;
+        patch.enter(frame.cube, [0, 1, 2].map(|axis| centre[axis] - self.middle[axis]));
+        patch.shared = Moments { sums: frame.core }.shifted(centre.map(|c| -c));
+        let mut splitter = Splitter {
+            set: self.set,
+            scale: self.scale,
+            half: forest.units(half) as f32,
+            block: &mut self.block,
+            shared: BlockSums::new(self.set),
+        };
+        splitter.block.len = 0;
+        let node = |source: &Source| &nodes[source.node as usize];
         let near = &self.near[frame.near.clone()];
-        let nodes = &self.forest.nodes;
-        for row in near.chunk_by(|a, b| nodes[a.node as usize].row == nodes[b.node as usize].row) {
-            let key = self.forest.key(nodes[row[0].node as usize].row);
-            let between = lattice.between(self.key, key).map(|b| b * units);
-            let cube = QueryCube {
-                scale: self.scale,
-                shift: [0, 1, 2].map(|axis| (between[axis] - leaf.centre[axis]) as f32),
-                half: self.forest.units(half) as f32,
-            };
-            let first = leaf.rim.len;
-            // Neighbouring leaves have neighbouring points.
-            let adjoin = |a: &Source, b: &Source| {
-                nodes[a.node as usize].end_point == nodes[b.node as usize].first_point
-            };
-            for run in row.chunk_by(adjoin) {
-                let (from, to) = (
-                    nodes[run[0].node as usize].points().start,
-                    nodes[run[run.len() - 1].node as usize].points().end,
-                );
-                for start in (from..to).step_by(PIECE) {
-                    let ranks = start..to.min(start + PIECE);
-                    split(self.set, points, ranks, cube, &mut self.block, &mut leaf.rim);
-                    while self.block.len >= BLOCK {
-                        inside.visit(&self.block, BLOCK);
-                        self.block.carry_over();
-                    }
-                }
-            }
-            leaf.windows.push(Window { ranks: first..leaf.rim.len, between });
+        for row in near.chunk_by(|a, b| node(a).row == node(b).row) {
+            let between = lattice.between(self.key, forest.key(node(&row[0]).row));
+            let between = between.map(|length| length * f64::from(self.scale));
+            // Neighbouring cubes have neighbouring points.
+            let runs = row
+                .chunk_by(|a, b| node(a).end_point == node(b).first_point)
+                .map(|run| node(&run[0]).points().start..node(&run[run.len() - 1]).points().end);
+            splitter.split(forest.points(), runs, between, patch);
         }
-        finish(&mut self.block, &mut inside);
-        leaf.core += inside.total;
-        self.last
+        splitter.finish(patch);
     }
 
-    /// The moments of the ball around a query of a prepared leaf, about the query, in units of the radius.
+    /// Looks at the rim of the present patch for one of its octants.
+    fn refine(&mut self, cube: Cube) {
+        let Self { patch, last_patches, forest, .. } = self;
+        let octant = &mut last_patches[self.last];
+        let step =
+            |axis: usize| f64::from(cube.low[axis] - patch.cube.low[axis]) - 0.5 * f64::from(cube.size);
+        let shift = [0, 1, 2].map(|axis| forest.units(step(axis)));
+        octant.enter(cube, [0, 1, 2].map(|axis| patch.centre[axis] + shift[axis]));
+        octant.shared = patch.shared.shifted(shift.map(|s| -s));
+        let mut splitter = Splitter {
+            set: self.set,
+            scale: self.scale,
+            half: forest.units(0.5 * f64::from(cube.size)) as f32,
+            block: &mut self.block,
+            shared: BlockSums::new(self.set),
+        };
+        splitter.block.len = 0;
+        for Window { ranks, between } in &patch.windows {
+            splitter.split(patch.rim.rows(), std::iter::once(ranks.clone()), *between, octant);
+        }
+        splitter.finish(octant);
+    }
+
+    /// The moments of the ball around a query of a prepared patch, about the query, in units of the radius.
     pub fn moments<S: Scalar>(&mut self, slot: usize, offset: [f32; 3]) -> Moments<f64> {
-        let leaf = &self.leaves[slot];
+        let patch = &self.last_patches[slot];
         let ball = Ball::around(offset, self.scale, &self.index.lattice);
         let mut rim = BlockSums::<S>::new(self.set);
-        let rows = Rows { x: &leaf.rim.x, y: &leaf.rim.y, z: &leaf.rim.z };
-        visit_members(self.set, rows, &leaf.windows, ball, &mut self.block, &mut rim);
-        leaf.core.shifted([0, 1, 2].map(|axis| leaf.centre[axis] - ball.query[axis])) + rim.total
+        visit_members(self.set, patch.rim.rows(), &patch.windows, ball, &mut self.block, &mut rim);
+        patch.shared.shifted([0, 1, 2].map(|axis| patch.centre[axis] - ball.query[axis])) + rim.total
+    }
+}
+
+/// The octants of a cube that hold some of these queries, the last first.
+fn octants_of(
+    queries: &[u64],
+    cube: Cube,
+    range: Range<usize>,
+) -> impl Iterator<Item = (Cube, Range<usize>)> + '_ {
+    let mut end = range.end;
+    std::iter::from_fn(move || {
+        let octant_of = |query: &u64| octant((query >> 32) as u32, cube.size);
+        let number = octant_of(queries[range.start..end].last()?);
+        let start =
+            range.start + queries[range.start..end].partition_point(|query| octant_of(query) < number);
+        let octant = (cube.octant(number), start..end);
+        end = start;
+        Some(octant)
+    })
+}
+
+impl Patch {
+    fn new() -> Self {
+        Self {
+            cube: Cube { low: [0; 3], size: 0 },
+            centre: [0.0; 3],
+            shared: Moments::default(),
+            rim: Rim::default(),
+            windows: Vec::new(),
+        }
+    }
+
+    fn enter(&mut self, cube: Cube, centre: [f64; 3]) {
+        (self.cube, self.centre) = (cube, centre);
+        self.rim.len = 0;
+        self.windows.clear();
+    }
+}
+
+/// Deals points to the shared sums and to the rim of a patch.
+struct Splitter<'a> {
+    set: InstructionSet,
+    scale: f32,
+    half: f32,
+    block: &'a mut Block,
+    shared: BlockSums<f64>,
+}
+
+impl Splitter<'_> {
+    /// Deals runs of points of one row, whose middle is so far from that of the queries' row.
+    fn split(
+        &mut self,
+        rows: Rows<'_>,
+        runs: impl Iterator<Item = Range<usize>>,
+        between: [f64; 3],
+        patch: &mut Patch,
+    ) {
+        let shift = [0, 1, 2].map(|axis| (between[axis] - patch.centre[axis]) as f32);
+        let cube = QueryCube { scale: self.scale, shift, half: self.half };
+        let first = patch.rim.len;
+        for run in runs {
+            for start in run.clone().step_by(PIECE) {
+                let ranks = start..run.end.min(start + PIECE);
+                split(self.set, rows, ranks, cube, self.block, &mut patch.rim);
+                while self.block.len >= BLOCK {
+                    self.shared.visit(self.block, BLOCK);
+                    self.block.carry_over();
+                }
+            }
+        }
+        if patch.rim.len > first {
+            patch.windows.push(Window { ranks: first..patch.rim.len, between });
+        }
+    }
+
+    fn finish(mut self, patch: &mut Patch) {
+        finish(self.block, &mut self.shared);
+        patch.shared += self.shared.total;
     }
 }

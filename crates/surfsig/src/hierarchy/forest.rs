@@ -19,13 +19,13 @@ const MARGIN: i64 = 3;
 /// Cells along the edge of a region with its margin.
 const WIDTH: i64 = CELLS_PER_REGION + 2 * MARGIN;
 
-/// Points of a cube that is not cut any further.
-const LEAF: usize = 12;
+/// Points up to which the sums of a cube are taken from them, one after the other; beyond, from its octants.
+const FEW: usize = 48;
 
 /// A cube of a tree, and the points in it.
 pub(super) struct Node {
     pub cube: Cube,
-    /// Number of children, which stand side by side; none where the cube is a leaf.
+    /// Number of children, which stand side by side; none where the cube has not been cut.
     pub child_count: u8,
     /// In which of the forest's rows the points are.
     pub row: u16,
@@ -43,8 +43,9 @@ impl Node {
         self.first_child..self.first_child + u32::from(self.child_count)
     }
 
-    pub fn is_leaf(&self) -> bool {
-        self.child_count == 0
+    /// Whether the cube holds few points, or is as small as cubes get.
+    pub fn is_small(&self) -> bool {
+        self.points().len() <= FEW || self.cube.size == 1
     }
 }
 
@@ -86,6 +87,8 @@ pub(super) struct Forest<'a> {
     y: Vec<f32>,
     z: Vec<f32>,
     points: usize,
+    /// Where each point is on the curve through its cell.
+    places: Vec<u32>,
     /// Of the points of the tree that is being built: place along the curve, and number in the row.
     curve: Vec<u64>,
 }
@@ -104,6 +107,7 @@ impl<'a> Forest<'a> {
             y: Vec::new(),
             z: Vec::new(),
             points: 0,
+            places: Vec::new(),
             curve: Vec::new(),
         }
     }
@@ -116,6 +120,7 @@ impl<'a> Forest<'a> {
         self.nodes.clear();
         self.sums.clear();
         self.points = 0;
+        self.places.clear();
         self.rows.clear();
         let [x, y, z] = self.corner;
         for z in z..z + WIDTH {
@@ -148,7 +153,7 @@ impl<'a> Forest<'a> {
     /// The middle of a row from the middle of the region, in units of the radius.
     pub fn middle_of(&self, key: RowKey) -> [f64; 3] {
         let middle = self.corner.map(|cell| cell + WIDTH / 2);
-        self.index.lattice.from_corner(middle, key).map(|length| length * self.scale)
+        self.index.lattice.beyond_corner(middle, key).map(|length| length * self.scale)
     }
 
     /// Appends the roots of all trees that balls around points of the cell at this place can touch, row
@@ -174,7 +179,7 @@ impl<'a> Forest<'a> {
 
     /// A place along an axis, in parts from the corner of the margin, from the middle of the region, in units
     /// of the radius.
-    pub fn from_middle(&self, parts: f64) -> f64 {
+    pub fn beyond_middle(&self, parts: f64) -> f64 {
         self.units(parts - (WIDTH * i64::from(PARTS_PER_CELL) / 2) as f64)
     }
 
@@ -223,6 +228,7 @@ impl<'a> Forest<'a> {
             column.extend([0.0; PADDING]);
         }
         self.points += self.curve.len();
+        self.places.extend(self.curve.iter().map(|&point| (point >> 32) as u32));
         let root = self.nodes.len();
         let low = place.map(|cell| (cell * i64::from(PARTS_PER_CELL)) as i16);
         self.nodes.push(Node {
@@ -236,25 +242,35 @@ impl<'a> Forest<'a> {
         // Children are appended, and so are cut in their turn.
         let mut node = root;
         while node < self.nodes.len() {
-            self.cut(node, first_point);
+            if !self.nodes[node].is_small() {
+                self.cut(node);
+            }
             node += 1;
         }
         self.sum(root);
         Tree::Root(root as u32)
     }
 
-    /// Gives a node its children.
-    fn cut(&mut self, node: usize, first_point: u32) {
-        let Node { cube, row, first_point: first, end_point: end, .. } = self.nodes[node];
-        if (end - first) as usize <= LEAF || cube.size == 1 {
-            return;
+    /// The children of a node, which is cut if it has not been. How far a cube is cut does not follow from the
+    /// number of its points alone: a tile may hold only some of them, and must add up the same cubes.
+    pub fn children(&mut self, node: u32) -> Range<u32> {
+        if self.nodes[node as usize].child_count == 0 {
+            let first = self.nodes.len();
+            self.cut(node as usize);
+            self.sum(first);
         }
+        self.nodes[node as usize].children()
+    }
+
+    /// Gives a node its children.
+    fn cut(&mut self, node: usize) {
+        let Node { cube, row, first_point: first, end_point: end, .. } = self.nodes[node];
         let first_child = self.nodes.len() as u32;
         let mut start = first;
         while start < end {
-            let rest = &self.curve[(start - first_point) as usize..(end - first_point) as usize];
-            let octant = octant(rest[0] >> 32, cube.size);
-            let count = rest.partition_point(|&point| self::octant(point >> 32, cube.size) == octant);
+            let rest = &self.places[start as usize..end as usize];
+            let octant = octant(rest[0], cube.size);
+            let count = rest.partition_point(|&place| self::octant(place, cube.size) == octant);
             self.nodes.push(Node {
                 cube: cube.octant(octant),
                 child_count: 0,
@@ -269,14 +285,14 @@ impl<'a> Forest<'a> {
         self.nodes[node].child_count = (self.nodes.len() as u32 - first_child) as u8;
     }
 
-    /// The sums of a tree, children before parents.
-    fn sum(&mut self, root: usize) {
+    /// The sums of all nodes from `first` on, children before parents.
+    fn sum(&mut self, first: usize) {
         self.sums.resize(self.nodes.len(), [0.0; MOMENTS]);
-        let middle = self.middle_of(self.key(self.nodes[root].row));
-        for number in (root..self.nodes.len()).rev() {
+        let middle = self.middle_of(self.key(self.nodes[first].row));
+        for number in (first..self.nodes.len()).rev() {
             let node = &self.nodes[number];
             let mut sums = [0.0; MOMENTS];
-            if node.is_leaf() {
+            if node.is_small() {
                 for point in node.points() {
                     let offset = [self.x[point], self.y[point], self.z[point]];
                     add_point(&mut sums, [0, 1, 2].map(|a| f64::from(offset[a]) * self.scale + middle[a]));
@@ -329,7 +345,7 @@ pub(super) fn place_on_curve(part: [i32; 3]) -> u32 {
 
 /// Of a cube of this size, the octant that a place on the curve is in.
 #[inline]
-pub(super) fn octant(place: u64, size: i16) -> usize {
+pub(super) fn octant(place: u32, size: i16) -> usize {
     let level = size.trailing_zeros() - 1;
     (place >> (3 * level)) as usize & 7
 }

@@ -23,7 +23,8 @@ pub(crate) const PADDING: usize = 16;
 
 const CAPACITY: usize = BLOCK + PIECE + PADDING;
 
-/// Members of a ball: offsets from its centre, divided by its radius.
+/// Members of a ball: offsets from its centre, divided by its radius. Vectors of them lie in one cache line.
+#[repr(align(64))]
 pub(crate) struct Block {
     pub x: [f32; CAPACITY],
     pub y: [f32; CAPACITY],

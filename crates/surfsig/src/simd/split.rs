@@ -33,6 +33,10 @@ pub(crate) struct Rim {
 }
 
 impl Rim {
+    pub fn rows(&self) -> Rows<'_> {
+        Rows { x: &self.x, y: &self.y, z: &self.z }
+    }
+
     /// Makes room for so many points, and what a vector may overrun.
     fn reserve(&mut self, points: usize) {
         let wanted = self.len + points + PADDING;
