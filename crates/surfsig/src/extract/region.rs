@@ -1,8 +1,9 @@
 //! A thread's work where points are dense: whole regions, through the hierarchy.
 
-use super::extraction::ColumnsPart;
+use super::Monitor;
+use super::columns::ColumnsPart;
 use super::shares::DenseCell;
-use super::{Monitor, Pending, Worker};
+use super::worker::{Pending, Worker};
 use crate::Error;
 use crate::cell_index::CellIndex;
 use crate::simd::lanes::LANES;
