@@ -173,7 +173,7 @@ fn run(
     let own_radii = !matches!(neighborhood, Neighborhood::Ball(_));
     let mut columns = Columns::new(asked.len(), radius.get(), own_radii, options.axes);
     let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
-    let hierarchy = matches!(neighborhood, Neighborhood::Ball(_)) && !options.robust && std::env::var_os("SURFSIG_DIRECT").is_none();
+    let hierarchy = matches!(neighborhood, Neighborhood::Ball(_)) && !options.robust;
     let shares = shares(&index, asked, hierarchy);
     let parts = columns.parts(shares.iter().map(Share::len));
     // One by one, since some are large.
@@ -210,7 +210,7 @@ struct Worker<'a> {
 struct Pending {
     key: RowKey,
     offset: [f32; 3],
-    /// Where the hierarchical walk keeps what it shares with other queries.
+    /// Where the hierarchical walk keeps what the query shares with others.
     patch: Option<usize>,
     /// Where its values belong in the thread's part of the columns.
     entry: usize,
