@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use surfsig::{
-    CellIndex, Error, ExtractOptions, Extraction, FitAxes, InstructionSet, Monitor, PointCloud, Queries,
-    Radius, Status, extract, extract_monitored, voxel_representatives,
+    CellIndex, Error, ExtractOptions, Extraction, FitAxes, InstructionSet, Monitor, Neighborhood, PointCloud,
+    Queries, Radius, Status, extract, extract_monitored, voxel_representatives,
 };
 
 /// A reproducible value in [0, 1).
@@ -81,6 +81,73 @@ fn every_instruction_set_and_every_number_of_threads_gives_the_same_bits() {
                 let found = extract(&cloud, radius(0.2), &options(Some(set), Some(threads))).unwrap();
                 assert_same_bits(&found, &expected);
             }
+        }
+    }
+}
+
+/// Dense enough for the hierarchy: some 1,000 neighbours within 0.2, and a corner with thousands.
+fn dense() -> Vec<[f64; 3]> {
+    let mut points = bumpy(20_000);
+    points.extend(bumpy(8_000).iter().map(|p| [0.2 * p[0] + 0.6, 0.2 * p[1] - 0.6, 0.2 * p[2]]));
+    points
+}
+
+#[test]
+fn a_dense_cloud_has_the_same_bits_for_every_instruction_set_and_number_of_threads() {
+    let points = dense();
+    let cloud = PointCloud::new_f64(&points).with_origin([500_000.0, 4_500_000.0, 100.0]);
+    let options = |instruction_set, threads| ExtractOptions { instruction_set, threads, ..above() };
+    let expected = extract(&cloud, radius(0.2), &options(None, None)).unwrap();
+    for set in InstructionSet::available() {
+        for threads in [1, 2, 8] {
+            let found = extract(&cloud, radius(0.2), &options(Some(set), Some(threads))).unwrap();
+            assert_same_bits(&found, &expected);
+        }
+    }
+}
+
+#[test]
+fn a_tile_with_a_margin_of_one_radius_has_the_bits_of_the_whole_cloud() {
+    let points = dense();
+    for origin in [[0.0; 3], [500_000.0, 4_500_000.0, 100.0]] {
+        let whole =
+            extract(&PointCloud::new_f64(&points).with_origin(origin), radius(0.2), &above()).unwrap();
+        for [low, high] in [[[-0.31, -0.77], [0.22, -0.13]], [[0.5, -0.8], [0.77, -0.47]]] {
+            let within = |p: &[f64; 3], margin: f64| {
+                (0..2).all(|axis| p[axis] >= low[axis] - margin && p[axis] <= high[axis] + margin)
+            };
+            let numbers: Vec<usize> = (0..points.len()).filter(|&i| within(&points[i], 0.2001)).collect();
+            let tile: Vec<[f64; 3]> = numbers.iter().map(|&i| points[i]).collect();
+            let found =
+                extract(&PointCloud::new_f64(&tile).with_origin(origin), radius(0.2), &above()).unwrap();
+            let inner: Vec<usize> = (0..tile.len()).filter(|&i| within(&tile[i], 0.0)).collect();
+            assert!(inner.len() > 1000);
+            for i in inner {
+                assert_eq!(bits(&found, i), bits(&whole, numbers[i]), "{:?}", tile[i]);
+            }
+        }
+    }
+}
+
+#[test]
+fn dense_cells_have_the_curvature_of_the_direct_walk_and_the_bits_of_chosen_points() {
+    let points = dense();
+    let cloud = PointCloud::new_f64(&points);
+    let found = extract(&cloud, radius(0.2), &above()).unwrap();
+    let chosen: Vec<u32> = (0..1000).map(|i| (random(i, 9) * points.len() as f64) as u32).collect();
+    let ask = |neighborhood: Neighborhood| {
+        extract_monitored(&cloud, neighborhood, &Queries::Indices(&chosen), &above(), &Monitor::default())
+            .unwrap()
+    };
+    let few = ask(radius(0.2).into());
+    // Chosen by distance, points are looked at one by one.
+    let direct = ask(Neighborhood::Hybrid { radius: radius(0.2), most: points.len() });
+    for (row, &i) in chosen.iter().enumerate() {
+        let i = i as usize;
+        assert_eq!(bits(&few, row), bits(&found, i));
+        assert_eq!((found.count[i], found.status[i]), (direct.count[row], direct.status[row]));
+        for (a, b) in [(found.k1[i], direct.k1[row]), (found.k2[i], direct.k2[row])] {
+            assert!((a - b).abs() <= 1e-5 * b.abs().max(1.0 / 0.2), "{a} {b}");
         }
     }
 }

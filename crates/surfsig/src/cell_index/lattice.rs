@@ -79,7 +79,7 @@ impl Lattice {
     }
 
     /// From a corner of cells, numbered along x, y, z, to the middle of a row: exact likewise.
-    pub fn beyond_corner(&self, [x, y, z]: [i64; 3], row: RowKey) -> [f64; 3] {
+    pub fn middle_from_corner(&self, [x, y, z]: [i64; 3], row: RowKey) -> [f64; 3] {
         let cells = |twice: i64| twice as f64 * self.half_step();
         [
             cells((2 * row.x + 1) * CELLS_PER_ROW - 2 * x),

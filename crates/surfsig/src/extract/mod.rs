@@ -169,9 +169,7 @@ fn run(
     let own_radii = !matches!(neighborhood, Neighborhood::Ball(_));
     let mut columns = Columns::new(asked.len(), radius.get(), own_radii, options);
     let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
-    let hierarchy = matches!(neighborhood, Neighborhood::Ball(_))
-        && !options.robust
-        && std::env::var_os("SURFSIG_DIRECT").is_none();
+    let hierarchy = matches!(neighborhood, Neighborhood::Ball(_)) && !options.robust;
     let shares = shares(&index, asked, hierarchy);
     let parts = columns.parts(shares.iter().map(Share::len));
     // One by one, since some are large.

@@ -1,36 +1,38 @@
 //! The walk over cubes of queries and cubes of points at once.
 //!
 //! What is inside all balls around the queries of a cube is added once for all of them; what is outside
-//! all of them is dropped once; only the rest is looked at again for the cubes that the first is cut
-//! into. A small cube of queries is left with the points on the rims of its balls, which are packed for
-//! all its queries, and tested for each exactly as by the walk over the points themselves: the members
-//! of every ball are the same.
+//! all of them is dropped once; only the rest is looked at again for the octants of the cube. Large cubes
+//! are compared with cubes of points, small ones with the points themselves. In the end each query is left
+//! with the points near the rim of its ball, which are tested exactly as by the walk over all points: the
+//! members of every ball are the same.
+//!
+//! Whatever is added belongs to the balls of all queries for which it is added, and how far cubes are cut
+//! follows from the queries' cell. So the sums of a ball do not depend on what lies outside of it, nor on
+//! the other queries: a tile with a margin of one radius gives the same bits as the whole cloud.
 
 use super::cube::{Cube, Relation};
-use super::forest::{Forest, Node, Source, add, octant, place_on_curve};
-use crate::ball::{BallVisitor, finish, visit_members};
+use super::forest::{Forest, Source, add, octant, place_on_curve};
+use super::patch::{Patch, Splitter};
+use crate::ball::visit_members;
 use crate::block_sums::BlockSums;
 use crate::cell_index::{CellIndex, PARTS_PER_CELL, RowKey};
 use crate::moments::{MOMENTS, Moments, Scalar};
 use crate::simd::InstructionSet;
 use crate::simd::lanes::LANES;
-use crate::simd::select::{BLOCK, Ball, Block, PIECE, Rows, Window};
-use crate::simd::split::{QueryCube, Rim, split};
+use crate::simd::select::{Ball, Block, Window};
 use std::ops::Range;
 
-/// Points of a cube of queries beyond which it is cut once more after its patch is prepared.
-const MANY: usize = 12;
+/// Points in a cube of queries beyond which its patch is not handed out, but those of its octants.
+const MANY: usize = 8;
 
-/// A cube of queries: what its balls share, and what each must look at.
-struct Patch {
+/// A cube of queries whose patch must be prepared from that of the cube around it.
+struct Octant {
+    /// How many cubes with patches are around it.
+    level: usize,
     cube: Cube,
-    /// The cube's centre, from the middle of the queries' row, in units of the radius.
-    centre: [f64; 3],
-    /// Sums of the points that are in all balls, about the centre.
-    shared: Moments<f64>,
-    /// The points that may be in some, row by row.
-    rim: Rim,
-    windows: Vec<Window>,
+    /// The same cube in the tree of points, where it holds any.
+    node: Option<u32>,
+    queries: Range<usize>,
 }
 
 /// A cube of queries that waits to be walked.
@@ -62,9 +64,9 @@ pub(crate) struct HierarchicalWalk<'a> {
     compared: Vec<Source>,
     /// Nodes inside all balls of the present cube of queries.
     inside: Vec<u32>,
-    /// The present patch, and those octants of it that have yet to be prepared, with their queries.
-    patch: Patch,
-    octants: Vec<(Cube, Range<usize>)>,
+    /// The present patches, each of an octant of the one before.
+    patches: Vec<Patch>,
+    octants: Vec<Octant>,
     /// The last patches that were handed out: as many as a batch of fits may come back to.
     last_patches: [Patch; LANES],
     last: usize,
@@ -87,7 +89,7 @@ impl<'a> HierarchicalWalk<'a> {
             near: Vec::new(),
             compared: Vec::new(),
             inside: Vec::new(),
-            patch: Patch::new(),
+            patches: Vec::new(),
             octants: Vec::new(),
             last_patches: std::array::from_fn(|_| Patch::new()),
             last: 0,
@@ -134,43 +136,67 @@ impl<'a> HierarchicalWalk<'a> {
         if self.octants.is_empty() {
             self.walk_to_patch()?;
         }
-        let (cube, queries) = self.octants.pop()?;
-        self.last = (self.last + 1) % LANES;
-        if cube == self.patch.cube {
-            std::mem::swap(&mut self.patch, &mut self.last_patches[self.last]);
-        } else {
-            self.refine(cube);
+        while let Some(Octant { level, cube, node, queries }) = self.octants.pop() {
+            if level > 0 {
+                self.refine(level, cube);
+            }
+            match node.filter(|&node| self.forest.nodes[node as usize].points().len() > MANY && cube.size > 1)
+            {
+                Some(node) => self.cut(level + 1, cube, node, queries),
+                None => {
+                    self.last = (self.last + 1) % LANES;
+                    std::mem::swap(&mut self.patches[level], &mut self.last_patches[self.last]);
+                    return Some((self.last, queries));
+                }
+            }
         }
-        Some((self.last, queries))
+        None
     }
 
-    /// Walks on until a cube of queries needs no more cutting, and prepares it.
+    /// Walks on until a cube of queries holds few points, and prepares its patch.
     fn walk_to_patch(&mut self) -> Option<()> {
         while let Some(mut frame) = self.frames.pop() {
             // What lies beyond belongs to cubes that are done.
             self.near.truncate(frame.near.end);
             self.compare(&mut frame);
-            let node = frame.node.map(|node| &self.forest.nodes[node as usize]);
-            let children = node.filter(|node| !node.is_small()).map(Node::children);
-            let points = node.map_or(0, |node| node.points().len());
-            if let Some(children) = children {
-                for (cube, queries) in octants_of(&self.queries, frame.cube, frame.queries.clone()) {
-                    let same = |child: &u32| self.forest.nodes[*child as usize].cube == cube;
-                    let node = children.clone().find(same);
-                    let (near, core) = (frame.near.clone(), frame.core);
-                    self.frames.push(Frame { cube, node, queries, near, core });
+            match frame.node.filter(|&node| !self.forest.nodes[node as usize].is_small()) {
+                Some(node) => {
+                    self.cut(0, frame.cube, node, frame.queries);
+                    let Frame { near, core, .. } = frame;
+                    self.frames.extend(self.octants.drain(..).map(
+                        |Octant { cube, node, queries, .. }| Frame {
+                            cube,
+                            node,
+                            queries,
+                            near: near.clone(),
+                            core,
+                        },
+                    ));
                 }
-                continue;
+                None => {
+                    self.prepare(&frame);
+                    let Frame { cube, node, queries, .. } = frame;
+                    self.octants.push(Octant { level: 0, cube, node, queries });
+                    return Some(());
+                }
             }
-            self.prepare(&frame);
-            if points > MANY && frame.cube.size > 1 {
-                self.octants.extend(octants_of(&self.queries, frame.cube, frame.queries));
-            } else {
-                self.octants.push((frame.cube, frame.queries));
-            }
-            return Some(());
         }
         None
+    }
+
+    /// Cuts a cube of queries into those octants that hold some, the last first.
+    fn cut(&mut self, level: usize, cube: Cube, node: u32, queries: Range<usize>) {
+        let children = self.forest.children(node);
+        let octant_of = |query: &u64| octant((query >> 32) as u32, cube.size);
+        let mut end = queries.end;
+        while let Some(number) = self.queries[queries.start..end].last().map(octant_of) {
+            let before = self.queries[queries.start..end].partition_point(|query| octant_of(query) < number);
+            let start = queries.start + before;
+            let cube = cube.octant(number);
+            let node = children.clone().find(|&child| self.forest.nodes[child as usize].cube == cube);
+            self.octants.push(Octant { level, cube, node, queries: start..end });
+            end = start;
+        }
     }
 
     /// The number that the caller gave to a query of the present cell.
@@ -233,18 +259,14 @@ impl<'a> HierarchicalWalk<'a> {
     fn prepare(&mut self, frame: &Frame) {
         let (forest, nodes, lattice) = (&self.forest, &self.forest.nodes, &self.index.lattice);
         let half = 0.5 * f64::from(frame.cube.size);
-        let centre = frame.cube.low.map(|low| forest.beyond_middle(f64::from(low) + half));
-        let patch = &mut self.patch;
+        let centre = frame.cube.low.map(|low| forest.place_from_middle(f64::from(low) + half));
+        if self.patches.is_empty() {
+            self.patches.push(Patch::new());
+        }
+        let patch = &mut self.patches[0];
         patch.enter(frame.cube, [0, 1, 2].map(|axis| centre[axis] - self.middle[axis]));
         patch.shared = Moments { sums: frame.core }.shifted(centre.map(|c| -c));
-        let mut splitter = Splitter {
-            set: self.set,
-            scale: self.scale,
-            half: forest.units(half) as f32,
-            block: &mut self.block,
-            shared: BlockSums::new(self.set),
-        };
-        splitter.block.len = 0;
+        let mut splitter = Splitter::new(self.set, self.scale, forest.units(half) as f32, &mut self.block);
         let node = |source: &Source| &nodes[source.node as usize];
         let near = &self.near[frame.near.clone()];
         for row in near.chunk_by(|a, b| node(a).row == node(b).row) {
@@ -259,23 +281,24 @@ impl<'a> HierarchicalWalk<'a> {
         splitter.finish(patch);
     }
 
-    /// Looks at the rim of the present patch for one of its octants.
-    fn refine(&mut self, cube: Cube) {
-        let Self { patch, last_patches, forest, .. } = self;
-        let octant = &mut last_patches[self.last];
+    /// Looks at the rim of the patch before this level for one of its octants.
+    fn refine(&mut self, level: usize, cube: Cube) {
+        if self.patches.len() == level {
+            self.patches.push(Patch::new());
+        }
+        let (before, after) = self.patches.split_at_mut(level);
+        let (patch, octant, forest) = (&before[level - 1], &mut after[0], &self.forest);
         let step =
             |axis: usize| f64::from(cube.low[axis] - patch.cube.low[axis]) - 0.5 * f64::from(cube.size);
         let shift = [0, 1, 2].map(|axis| forest.units(step(axis)));
         octant.enter(cube, [0, 1, 2].map(|axis| patch.centre[axis] + shift[axis]));
         octant.shared = patch.shared.shifted(shift.map(|s| -s));
-        let mut splitter = Splitter {
-            set: self.set,
-            scale: self.scale,
-            half: forest.units(0.5 * f64::from(cube.size)) as f32,
-            block: &mut self.block,
-            shared: BlockSums::new(self.set),
-        };
-        splitter.block.len = 0;
+        let mut splitter = Splitter::new(
+            self.set,
+            self.scale,
+            forest.units(0.5 * f64::from(cube.size)) as f32,
+            &mut self.block,
+        );
         for Window { ranks, between } in &patch.windows {
             splitter.split(patch.rim.rows(), std::iter::once(ranks.clone()), *between, octant);
         }
@@ -289,83 +312,5 @@ impl<'a> HierarchicalWalk<'a> {
         let mut rim = BlockSums::<S>::new(self.set);
         visit_members(self.set, patch.rim.rows(), &patch.windows, ball, &mut self.block, &mut rim);
         patch.shared.shifted([0, 1, 2].map(|axis| patch.centre[axis] - ball.query[axis])) + rim.total
-    }
-}
-
-/// The octants of a cube that hold some of these queries, the last first.
-fn octants_of(
-    queries: &[u64],
-    cube: Cube,
-    range: Range<usize>,
-) -> impl Iterator<Item = (Cube, Range<usize>)> + '_ {
-    let mut end = range.end;
-    std::iter::from_fn(move || {
-        let octant_of = |query: &u64| octant((query >> 32) as u32, cube.size);
-        let number = octant_of(queries[range.start..end].last()?);
-        let start =
-            range.start + queries[range.start..end].partition_point(|query| octant_of(query) < number);
-        let octant = (cube.octant(number), start..end);
-        end = start;
-        Some(octant)
-    })
-}
-
-impl Patch {
-    fn new() -> Self {
-        Self {
-            cube: Cube { low: [0; 3], size: 0 },
-            centre: [0.0; 3],
-            shared: Moments::default(),
-            rim: Rim::default(),
-            windows: Vec::new(),
-        }
-    }
-
-    fn enter(&mut self, cube: Cube, centre: [f64; 3]) {
-        (self.cube, self.centre) = (cube, centre);
-        self.rim.len = 0;
-        self.windows.clear();
-    }
-}
-
-/// Deals points to the shared sums and to the rim of a patch.
-struct Splitter<'a> {
-    set: InstructionSet,
-    scale: f32,
-    half: f32,
-    block: &'a mut Block,
-    shared: BlockSums<f64>,
-}
-
-impl Splitter<'_> {
-    /// Deals runs of points of one row, whose middle is so far from that of the queries' row.
-    fn split(
-        &mut self,
-        rows: Rows<'_>,
-        runs: impl Iterator<Item = Range<usize>>,
-        between: [f64; 3],
-        patch: &mut Patch,
-    ) {
-        let shift = [0, 1, 2].map(|axis| (between[axis] - patch.centre[axis]) as f32);
-        let cube = QueryCube { scale: self.scale, shift, half: self.half };
-        let first = patch.rim.len;
-        for run in runs {
-            for start in run.clone().step_by(PIECE) {
-                let ranks = start..run.end.min(start + PIECE);
-                split(self.set, rows, ranks, cube, self.block, &mut patch.rim);
-                while self.block.len >= BLOCK {
-                    self.shared.visit(self.block, BLOCK);
-                    self.block.carry_over();
-                }
-            }
-        }
-        if patch.rim.len > first {
-            patch.windows.push(Window { ranks: first..patch.rim.len, between });
-        }
-    }
-
-    fn finish(mut self, patch: &mut Patch) {
-        finish(self.block, &mut self.shared);
-        patch.shared += self.shared.total;
     }
 }

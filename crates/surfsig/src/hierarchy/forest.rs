@@ -20,7 +20,8 @@ const MARGIN: i64 = 3;
 const WIDTH: i64 = CELLS_PER_REGION + 2 * MARGIN;
 
 /// Points up to which the sums of a cube are taken from them, one after the other; beyond, from its octants.
-const FEW: usize = 48;
+/// Queries of a cube with so few are compared with points, no longer with cubes.
+const FEW: usize = 256;
 
 /// A cube of a tree, and the points in it.
 pub(super) struct Node {
@@ -153,7 +154,7 @@ impl<'a> Forest<'a> {
     /// The middle of a row from the middle of the region, in units of the radius.
     pub fn middle_of(&self, key: RowKey) -> [f64; 3] {
         let middle = self.corner.map(|cell| cell + WIDTH / 2);
-        self.index.lattice.beyond_corner(middle, key).map(|length| length * self.scale)
+        self.index.lattice.middle_from_corner(middle, key).map(|length| length * self.scale)
     }
 
     /// Appends the roots of all trees that balls around points of the cell at this place can touch, row
@@ -179,7 +180,7 @@ impl<'a> Forest<'a> {
 
     /// A place along an axis, in parts from the corner of the margin, from the middle of the region, in units
     /// of the radius.
-    pub fn beyond_middle(&self, parts: f64) -> f64 {
+    pub fn place_from_middle(&self, parts: f64) -> f64 {
         self.units(parts - (WIDTH * i64::from(PARTS_PER_CELL) / 2) as f64)
     }
 

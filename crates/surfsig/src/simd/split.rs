@@ -206,3 +206,43 @@ mod x86 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_instruction_set_deals_the_points_alike() {
+        let value = |i: usize, seed: u32| {
+            let bits =
+                (3 * i as u32 + seed).wrapping_mul(2_654_435_761).rotate_left(13).wrapping_mul(2_246_822_519);
+            (bits >> 8) as f32 / (1 << 24) as f32 * 2.4 - 1.2
+        };
+        let [x, y, z] =
+            [0, 1, 2].map(|seed| (0..PIECE + PADDING).map(|i| value(i, seed)).collect::<Vec<f32>>());
+        let cube = QueryCube { scale: 0.9, shift: [0.1, -0.2, 0.05], half: 0.125 };
+        let square = |i: usize, side: f32| -> f32 {
+            let place = [x[i] * 0.9 + 0.1, y[i] * 0.9 - 0.2, z[i] * 0.9 + 0.05];
+            place.map(|c| (c.abs() + side * 0.125).max(0.0).powi(2)).iter().sum()
+        };
+        for set in InstructionSet::available() {
+            for len in [0, 1, 7, 8, 9, 15, 16, 17, 100, PIECE] {
+                let (mut inside, mut rim) = (Block::new(), Rim::default());
+                let rows = Rows { x: &x, y: &y, z: &z };
+                split(set, rows, 0..len, cube, &mut inside, &mut rim);
+                let all: Vec<usize> = (0..len).filter(|&i| square(i, 1.0) <= 1.0).collect();
+                let some: Vec<usize> =
+                    (0..len).filter(|&i| square(i, 1.0) > 1.0 && square(i, -1.0) <= 1.0).collect();
+                assert_eq!((inside.len, rim.len), (all.len(), some.len()), "{} {len}", set.name());
+                for (slot, i) in all.into_iter().enumerate() {
+                    assert_eq!(inside.x[slot], x[i].mul_add(0.9, 0.1));
+                    assert_eq!(inside.y[slot], y[i].mul_add(0.9, -0.2));
+                    assert_eq!(inside.z[slot], z[i].mul_add(0.9, 0.05));
+                }
+                for (slot, i) in some.into_iter().enumerate() {
+                    assert_eq!([rim.x[slot], rim.y[slot], rim.z[slot]], [x[i], y[i], z[i]]);
+                }
+            }
+        }
+    }
+}
