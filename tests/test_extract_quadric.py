@@ -16,6 +16,10 @@ def patch(kind: str, radius: float, rng: np.random.Generator, count: int, noise:
     kept: list[Array] = []
     while sum(map(len, kept)) < count:
         turn = rng.normal(size=(4 * count, 3))
+        if radius > BALL:
+            # Only a cap is within the ball.
+            turn = np.column_stack([rng.uniform(-BALL, BALL, (4 * count, 2)), np.zeros(4 * count)])
+            turn[:, 2] = np.sqrt(radius**2 - turn[:, 0] ** 2 - (kind == "sphere") * turn[:, 1] ** 2)
         if kind == "cylinder":
             turn[:, 1] = 0
         normals = turn / np.linalg.norm(turn, axis=1)[:, None]
