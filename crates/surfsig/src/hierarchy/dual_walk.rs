@@ -2,7 +2,8 @@
 //!
 //! What is inside all balls around the queries of a cube is added once for all of them; what is outside
 //! all of them is dropped once; only the rest is looked at again for the octants of the cube. Large cubes
-//! are compared with cubes of points, small ones with the points themselves. In the end each query is left
+//! are compared with cubes of points, small ones, drawn in to the bounds of their own points, with single
+//! points. In the end each query is left
 //! with the points near the rim of its ball, which are tested exactly as by the walk over all points: the
 //! members of every ball are the same.
 //!
@@ -19,7 +20,7 @@ use crate::cell_index::{CellIndex, PARTS_PER_CELL, RowKey};
 use crate::moments::{MOMENTS, Moments, Scalar};
 use crate::simd::InstructionSet;
 use crate::simd::lanes::LANES;
-use crate::simd::select::{Ball, Block, Window};
+use crate::simd::select::{Ball, Block, Rows, Window};
 use std::ops::Range;
 
 /// Points in a cube of queries beyond which its patch is not handed out, but those of its octants.
@@ -33,6 +34,30 @@ struct Octant {
     /// The same cube in the tree of points, where it holds any.
     node: Option<u32>,
     queries: Range<usize>,
+}
+
+/// The bounds of some points, from the middle of their row.
+#[derive(Clone, Copy)]
+struct Bounds {
+    low: [f32; 3],
+    high: [f32; 3],
+}
+
+impl Bounds {
+    fn of(points: Rows<'_>, range: Range<usize>) -> Self {
+        let mut bounds = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+        for point in range {
+            for (axis, value) in [points.x[point], points.y[point], points.z[point]].into_iter().enumerate() {
+                bounds.low[axis] = bounds.low[axis].min(value);
+                bounds.high[axis] = bounds.high[axis].max(value);
+            }
+        }
+        bounds
+    }
+
+    fn hold(&self, offset: [f32; 3]) -> bool {
+        (0..3).all(|axis| self.low[axis] <= offset[axis] && offset[axis] <= self.high[axis])
+    }
 }
 
 /// A cube of queries that waits to be walked.
@@ -57,6 +82,10 @@ pub(crate) struct HierarchicalWalk<'a> {
     middle: [f64; 3],
     /// Of each query of the present cell: place along the curve, and the number that the caller gave it.
     queries: Vec<u64>,
+    /// Their offsets from the row's middle, by number.
+    offsets: Vec<[f32; 3]>,
+    /// Queries that are outside the bounds of their octants' points: they have the patch of the whole cube.
+    strays: Vec<u64>,
     frames: Vec<Frame>,
     /// Cubes of points that are near to those cubes of queries that are being walked.
     near: Vec<Source>,
@@ -85,6 +114,8 @@ impl<'a> HierarchicalWalk<'a> {
             key,
             middle: [0.0; 3],
             queries: Vec::new(),
+            offsets: Vec::new(),
+            strays: Vec::new(),
             frames: Vec::new(),
             near: Vec::new(),
             compared: Vec::new(),
@@ -108,7 +139,9 @@ impl<'a> HierarchicalWalk<'a> {
         self.key = key;
         self.middle = self.forest.middle_of(key);
         self.queries.clear();
-        self.queries.extend((0..).zip(offsets).map(|(number, offset)| {
+        self.offsets.clear();
+        self.offsets.extend(offsets);
+        self.queries.extend(self.offsets.iter().zip(0..).map(|(&offset, number)| {
             u64::from(place_on_curve(self.index.lattice.part(offset))) << 32 | number
         }));
         self.queries.sort_unstable();
@@ -133,24 +166,54 @@ impl<'a> HierarchicalWalk<'a> {
     /// Prepares the cell's next patch. Gives its slot, good until [`LANES`] more are prepared, and which of the
     /// cell's queries are in it.
     pub fn next_patch(&mut self) -> Option<(usize, Range<usize>)> {
-        if self.octants.is_empty() {
+        while self.octants.is_empty() && self.strays.is_empty() {
             self.walk_to_patch()?;
         }
         while let Some(Octant { level, cube, node, queries }) = self.octants.pop() {
-            if level > 0 {
-                self.refine(level, cube);
+            let points = node.map(|node| self.forest.nodes[node as usize].points());
+            let bounds = points.clone().map(|points| Bounds::of(self.forest.points(), points));
+            let queries = match bounds {
+                Some(bounds) if level > 0 => self.within(bounds, queries),
+                None if level > 0 => self.within(Bounds::of(self.forest.points(), 0..0), queries),
+                _ => queries,
+            };
+            if queries.is_empty() {
+                continue;
             }
-            match node.filter(|&node| self.forest.nodes[node as usize].points().len() > MANY && cube.size > 1)
-            {
+            if let (Some(bounds), true) = (bounds, level > 0) {
+                self.refine(level, bounds);
+            }
+            let many = points.is_some_and(|points| points.len() > MANY) && cube.size > 1;
+            match node.filter(|_| many) {
                 Some(node) => self.cut(level + 1, cube, node, queries),
-                None => {
-                    self.last = (self.last + 1) % LANES;
-                    std::mem::swap(&mut self.patches[level], &mut self.last_patches[self.last]);
-                    return Some((self.last, queries));
-                }
+                None => return Some((self.hand_out(level), queries)),
             }
         }
-        None
+        let first = self.queries.len();
+        self.queries.append(&mut self.strays);
+        Some((self.hand_out(0), first..self.queries.len()))
+    }
+
+    /// Keeps a patch for its queries.
+    fn hand_out(&mut self, level: usize) -> usize {
+        self.last = (self.last + 1) % LANES;
+        std::mem::swap(&mut self.patches[level], &mut self.last_patches[self.last]);
+        self.last
+    }
+
+    /// Those of some queries that are within bounds, side by side; the others stray.
+    fn within(&mut self, bounds: Bounds, queries: Range<usize>) -> Range<usize> {
+        let mut end = queries.start;
+        for query in queries.clone() {
+            let query = self.queries[query];
+            if bounds.hold(self.offsets[query as u32 as usize]) {
+                self.queries[end] = query;
+                end += 1;
+            } else {
+                self.strays.push(query);
+            }
+        }
+        queries.start..end
     }
 
     /// Walks on until a cube of queries holds few points, and prepares its patch.
@@ -264,9 +327,9 @@ impl<'a> HierarchicalWalk<'a> {
             self.patches.push(Patch::new());
         }
         let patch = &mut self.patches[0];
-        patch.enter(frame.cube, [0, 1, 2].map(|axis| centre[axis] - self.middle[axis]));
-        patch.shared = Moments { sums: frame.core }.shifted(centre.map(|c| -c));
-        let mut splitter = Splitter::new(self.set, self.scale, forest.units(half) as f32, &mut self.block);
+        let shared = Moments { sums: frame.core }.shifted(centre.map(|c| -c));
+        patch.enter([0, 1, 2].map(|axis| centre[axis] - self.middle[axis]), shared);
+        let mut splitter = Splitter::new(self.set, self.scale, [forest.units(half); 3], &mut self.block);
         let node = |source: &Source| &nodes[source.node as usize];
         let near = &self.near[frame.near.clone()];
         for row in near.chunk_by(|a, b| node(a).row == node(b).row) {
@@ -281,28 +344,23 @@ impl<'a> HierarchicalWalk<'a> {
         splitter.finish(patch);
     }
 
-    /// Looks at the rim of the patch before this level for one of its octants.
-    fn refine(&mut self, level: usize, cube: Cube) {
+    /// Looks at the rim of the patch before this level for queries within the bounds of some of its points.
+    fn refine(&mut self, level: usize, Bounds { low, high }: Bounds) {
         if self.patches.len() == level {
             self.patches.push(Patch::new());
         }
         let (before, after) = self.patches.split_at_mut(level);
-        let (patch, octant, forest) = (&before[level - 1], &mut after[0], &self.forest);
-        let step =
-            |axis: usize| f64::from(cube.low[axis] - patch.cube.low[axis]) - 0.5 * f64::from(cube.size);
-        let shift = [0, 1, 2].map(|axis| forest.units(step(axis)));
-        octant.enter(cube, [0, 1, 2].map(|axis| patch.centre[axis] + shift[axis]));
-        octant.shared = patch.shared.shifted(shift.map(|s| -s));
-        let mut splitter = Splitter::new(
-            self.set,
-            self.scale,
-            forest.units(0.5 * f64::from(cube.size)) as f32,
-            &mut self.block,
-        );
-        for Window { ranks, between } in &patch.windows {
-            splitter.split(patch.rim.rows(), std::iter::once(ranks.clone()), *between, octant);
+        let (larger, patch) = (&before[level - 1], &mut after[0]);
+        let half_scale = 0.5 * f64::from(self.scale);
+        let centre = [0, 1, 2].map(|axis| (f64::from(low[axis]) + f64::from(high[axis])) * half_scale);
+        let half = [0, 1, 2].map(|axis| (f64::from(high[axis]) - f64::from(low[axis])) * half_scale);
+        let shift = [0, 1, 2].map(|axis| larger.centre[axis] - centre[axis]);
+        patch.enter(centre, larger.shared.shifted(shift));
+        let mut splitter = Splitter::new(self.set, self.scale, half, &mut self.block);
+        for Window { ranks, between } in &larger.windows {
+            splitter.split(larger.rim.rows(), std::iter::once(ranks.clone()), *between, patch);
         }
-        splitter.finish(octant);
+        splitter.finish(patch);
     }
 
     /// The moments of the ball around a query of a prepared patch, about the query, in units of the radius.

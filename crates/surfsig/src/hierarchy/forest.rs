@@ -11,7 +11,7 @@ use std::ops::Range;
 
 /// Cells along a region's edge; rows hold a whole number of them. Larger regions build fewer trees
 /// twice, and hold more at a time.
-pub(crate) const CELLS_PER_REGION: i64 = 4;
+pub(crate) const CELLS_PER_REGION: i64 = 8;
 
 /// Cells around a region that balls can touch.
 const MARGIN: i64 = 3;

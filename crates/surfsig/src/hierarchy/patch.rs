@@ -1,18 +1,16 @@
 //! What the balls of a small cube of queries share, and what each must look at.
 
-use super::cube::Cube;
 use crate::ball::{BallVisitor, finish};
 use crate::block_sums::BlockSums;
 use crate::moments::Moments;
 use crate::simd::InstructionSet;
 use crate::simd::select::{BLOCK, Block, PIECE, Rows, Window};
-use crate::simd::split::{QueryCube, Rim, split};
+use crate::simd::split::{QueryBox, Rim, split};
 use std::ops::Range;
 
-/// A cube of queries: what its balls share, and what each must look at.
+/// A box of queries: what its balls share, and what each must look at.
 pub(super) struct Patch {
-    pub cube: Cube,
-    /// The cube's centre, from the middle of the queries' row, in units of the radius.
+    /// The box's centre, from the middle of the queries' row, in units of the radius.
     pub centre: [f64; 3],
     /// Sums of the points that are in all balls, about the centre.
     pub shared: Moments<f64>,
@@ -23,17 +21,12 @@ pub(super) struct Patch {
 
 impl Patch {
     pub fn new() -> Self {
-        Self {
-            cube: Cube { low: [0; 3], size: 0 },
-            centre: [0.0; 3],
-            shared: Moments::default(),
-            rim: Rim::default(),
-            windows: Vec::new(),
-        }
+        Self { centre: [0.0; 3], shared: Moments::default(), rim: Rim::default(), windows: Vec::new() }
     }
 
-    pub fn enter(&mut self, cube: Cube, centre: [f64; 3]) {
-        (self.cube, self.centre) = (cube, centre);
+    /// Empties the patch for a box around this centre, with sums that are shared about it.
+    pub fn enter(&mut self, centre: [f64; 3], shared: Moments<f64>) {
+        (self.centre, self.shared) = (centre, shared);
         self.rim.len = 0;
         self.windows.clear();
     }
@@ -43,15 +36,16 @@ impl Patch {
 pub(super) struct Splitter<'a> {
     set: InstructionSet,
     scale: f32,
-    half: f32,
+    half: [f32; 3],
     block: &'a mut Block,
     shared: BlockSums<f64>,
 }
 
 impl<'a> Splitter<'a> {
-    /// For a cube with half this edge, in units of the radius; `scale` is one over it.
-    pub fn new(set: InstructionSet, scale: f32, half: f32, block: &'a mut Block) -> Self {
+    /// For a box with half these edges, in units of the radius; `scale` is one over it.
+    pub fn new(set: InstructionSet, scale: f32, half: [f64; 3], block: &'a mut Block) -> Self {
         block.len = 0;
+        let half = half.map(|h| h as f32);
         Self { set, scale, half, block, shared: BlockSums::new(set) }
     }
 
@@ -64,12 +58,12 @@ impl<'a> Splitter<'a> {
         patch: &mut Patch,
     ) {
         let shift = [0, 1, 2].map(|axis| (between[axis] - patch.centre[axis]) as f32);
-        let cube = QueryCube { scale: self.scale, shift, half: self.half };
+        let queries = QueryBox { scale: self.scale, shift, half: self.half };
         let first = patch.rim.len;
         for run in runs {
             for start in run.clone().step_by(PIECE) {
                 let ranks = start..run.end.min(start + PIECE);
-                split(self.set, rows, ranks, cube, self.block, &mut patch.rim);
+                split(self.set, rows, ranks, queries, self.block, &mut patch.rim);
                 while self.block.len >= BLOCK {
                     self.shared.visit(self.block, BLOCK);
                     self.block.carry_over();

@@ -47,13 +47,14 @@ fn points(shape: Shape, count: usize, seed: u64) -> Vec<[f64; 3]> {
     (0..count).map(point).collect()
 }
 
-/// Compares the sums around every `stride`-th query of each cell.
-fn compare(cloud: &PointCloud<'_>, queries: &PointCloud<'_>, radius: f64, stride: usize) {
-    let radius = Radius::new(radius).unwrap();
-    let index = CellIndex::new(cloud, radius).unwrap();
-    let asked = CellIndex::new(queries, radius).unwrap();
-    let set = InstructionSet::detect();
-    let (mut walk, mut direct) = (HierarchicalWalk::new(&index, set), DirectWalk::new(&index, set));
+/// Shows every query with its patch: its number, its row and its offset from the row's middle.
+fn each_query(
+    index: &CellIndex,
+    queries: &PointCloud<'_>,
+    mut show: impl FnMut(&mut HierarchicalWalk<'_>, usize, usize, RowKey, [f32; 3]),
+) {
+    let asked = CellIndex::new(queries, Radius::new(index.lattice.radius).unwrap()).unwrap();
+    let mut walk = HierarchicalWalk::new(index, InstructionSet::detect());
     let offset = |rank: usize| [asked.x[rank], asked.y[rank], asked.z[rank]];
     let mut seen = 0;
     for row in &asked.rows {
@@ -65,21 +66,32 @@ fn compare(cloud: &PointCloud<'_>, queries: &PointCloud<'_>, radius: f64, stride
             let place = [x * CELLS_PER_ROW + i64::from(cell), y, z];
             walk.enter_region(place.map(|c| c.div_euclid(CELLS_PER_REGION) * CELLS_PER_REGION));
             walk.enter_cell(row.key, cell, (start..end).map(offset));
-            direct.enter_row(row.key);
             while let Some((patch, range)) = walk.next_patch() {
-                seen += range.len();
-                for query in range.step_by(stride) {
-                    let offset = offset(start + walk.number(query));
-                    direct.enter_run(offset, offset);
-                    let expected = direct.moments::<f64>(offset);
-                    assert_close(&walk.moments::<f64>(patch, offset), &expected);
-                    assert_close(&walk.moments::<f32>(patch, offset), &expected);
+                for query in range {
+                    seen += 1;
+                    let rank = start + walk.number(query);
+                    show(&mut walk, patch, asked.point_of_rank[rank] as usize, row.key, offset(rank));
                 }
             }
             start = end;
         }
     }
     assert_eq!(seen, asked.len());
+}
+
+/// Compares the sums around every `stride`-th query with those of the direct walk.
+fn compare(cloud: &PointCloud<'_>, queries: &PointCloud<'_>, radius: f64, stride: usize) {
+    let index = CellIndex::new(cloud, Radius::new(radius).unwrap()).unwrap();
+    let mut direct = DirectWalk::new(&index, InstructionSet::detect());
+    each_query(&index, queries, |walk, patch, query, key, offset| {
+        if query % stride == 0 {
+            direct.enter_row(key);
+            direct.enter_run(offset, offset);
+            let expected = direct.moments::<f64>(offset);
+            assert_close(&walk.moments::<f64>(patch, offset), &expected);
+            assert_close(&walk.moments::<f32>(patch, offset), &expected);
+        }
+    });
 }
 
 /// The same number of points, and sums that differ, on average over the points, by no more than what rounding
@@ -125,5 +137,31 @@ fn thirty_thousand_neighbours_are_the_same_and_none_is_missed() {
         let points = points(shape, 40_000, 3);
         let cloud = PointCloud::new_f64(&points);
         compare(&cloud, &cloud, radius, 400);
+    }
+}
+
+#[test]
+fn sums_have_the_same_bits_in_a_tile_with_a_margin_of_one_radius_and_among_fewer_queries() {
+    let (points, radius) = (points(Shape::Surface, 60_000, 5), 0.2);
+    for origin in [[0.0; 3], [500_000.0, 4_500_000.0, 100.0]] {
+        let within = |p: &[f64; 3], margin: f64| {
+            (0..2).all(|axis| p[axis] >= 0.43 - margin && p[axis] <= 0.57 + margin)
+        };
+        let inner: Vec<[f64; 3]> = points.iter().filter(|p| within(p, 0.0)).step_by(3).copied().collect();
+        let tile: Vec<[f64; 3]> = points.iter().filter(|p| within(p, 1.0005 * radius)).copied().collect();
+        let sums = |cloud: &[[f64; 3]], queries: &[[f64; 3]]| {
+            let cloud = PointCloud::new_f64(cloud).with_origin(origin);
+            let index = CellIndex::new(&cloud, Radius::new(radius).unwrap()).unwrap();
+            let mut sums = vec![[0; 35]; queries.len()];
+            let queries = PointCloud::new_f64(queries).with_origin(origin);
+            each_query(&index, &queries, |walk, patch, query, _, offset| {
+                sums[query] = walk.moments::<f64>(patch, offset).sums.map(f64::to_bits);
+            });
+            sums
+        };
+        let whole = sums(&points, &inner);
+        assert!(whole == sums(&tile, &inner));
+        let some: Vec<[f64; 3]> = inner.iter().step_by(7).copied().collect();
+        assert!(sums(&points, &some).iter().eq(whole.iter().step_by(7)));
     }
 }

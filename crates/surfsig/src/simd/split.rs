@@ -1,26 +1,26 @@
-//! Tells, for a cube of queries, which points are in all of their balls, and which may be in some.
+//! Tells, for a box of queries, which points are in all of their balls, and which may be in some.
 
 use super::InstructionSet;
 use super::instruction_set::Kind;
 use super::select::{BLOCK, Block, PADDING, PIECE, Rows};
 use std::ops::Range;
 
-/// Farther than this from all points of the cube, the square in units of the radius: in no ball. The exact
+/// Farther than this from all points of the box, the square in units of the radius: in no ball. The exact
 /// test ends at 1 + 1e-5, and rounding moves a square by less than 5e-6.
 const OUTSIDE: f32 = 1.0 + 2e-5;
 
-/// Not farther than this from any point of the cube: in every ball, by the same margin.
+/// Not farther than this from any point of the box: in every ball, by the same margin.
 const INSIDE: f32 = 1.0;
 
-/// A cube of queries, from the middle of the row of the points that are looked at.
+/// A box of queries, from the middle of the row of the points that are looked at.
 #[derive(Clone, Copy)]
-pub(crate) struct QueryCube {
+pub(crate) struct QueryBox {
     /// One over the radius.
     pub scale: f32,
-    /// What takes a scaled offset to the cube's centre.
+    /// What takes a scaled offset to the box's centre.
     pub shift: [f32; 3],
-    /// Half the cube's edge, in units of the radius.
-    pub half: f32,
+    /// Half the box's edges, in units of the radius.
+    pub half: [f32; 3],
 }
 
 /// Points that may be in some balls, as the rows have them; each array is [`PADDING`] longer than `len`.
@@ -48,13 +48,13 @@ impl Rim {
     }
 }
 
-/// Appends the points of these ranks, at most [`PIECE`], to `inside` (offsets from the cube's centre in
+/// Appends the points of these ranks, at most [`PIECE`], to `inside` (offsets from the box's centre in
 /// units of the radius), to `rim`, or to neither.
 pub(crate) fn split(
     set: InstructionSet,
     rows: Rows<'_>,
     ranks: Range<usize>,
-    cube: QueryCube,
+    queries: QueryBox,
     inside: &mut Block,
     rim: &mut Rim,
 ) {
@@ -62,26 +62,26 @@ pub(crate) fn split(
     assert!(ranks.end + PADDING <= rows.x.len().min(rows.y.len()).min(rows.z.len()));
     rim.reserve(ranks.len());
     match set.0 {
-        Kind::Baseline => split_baseline(rows, ranks, cube, inside, rim),
+        Kind::Baseline => split_baseline(rows, ranks, queries, inside, rim),
         // SAFETY: the value of `set` proves the instructions; what is read and written is checked above.
         #[cfg(target_arch = "x86_64")]
-        Kind::Avx2 => unsafe { x86::split_avx2(rows, ranks, cube, inside, rim) },
+        Kind::Avx2 => unsafe { x86::split_avx2(rows, ranks, queries, inside, rim) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Kind::Avx512 => unsafe { x86::split_avx512(rows, ranks, cube, inside, rim) },
+        Kind::Avx512 => unsafe { x86::split_avx512(rows, ranks, queries, inside, rim) },
     }
 }
 
 /// A store of every point to both, of which the next overwrites those that do not belong.
-fn split_baseline(rows: Rows<'_>, ranks: Range<usize>, cube: QueryCube, inside: &mut Block, rim: &mut Rim) {
-    let QueryCube { scale, shift, half } = cube;
+fn split_baseline(rows: Rows<'_>, ranks: Range<usize>, queries: QueryBox, inside: &mut Block, rim: &mut Rim) {
+    let QueryBox { scale, shift, half } = queries;
     for rank in ranks {
         let offset = [rows.x[rank], rows.y[rank], rows.z[rank]];
         let (mut place, mut nearest, mut farthest) = ([0.0; 3], 0.0_f32, 0.0_f32);
         for axis in 0..3 {
             place[axis] = offset[axis].mul_add(scale, shift[axis]);
-            let far = place[axis].abs() + half;
-            let near = (place[axis].abs() - half).max(0.0);
+            let far = place[axis].abs() + half[axis];
+            let near = (place[axis].abs() - half[axis]).max(0.0);
             nearest = near.mul_add(near, nearest);
             farthest = far.mul_add(far, farthest);
         }
@@ -96,7 +96,7 @@ fn split_baseline(rows: Rows<'_>, ranks: Range<usize>, cube: QueryCube, inside: 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use super::super::select::PACK_LEFT;
-    use super::{Block, INSIDE, OUTSIDE, QueryCube, Rim, Rows};
+    use super::{Block, INSIDE, OUTSIDE, QueryBox, Rim, Rows};
     use std::arch::x86_64::*;
     use std::ops::Range;
 
@@ -107,13 +107,13 @@ mod x86 {
     pub(super) unsafe fn split_avx2(
         rows: Rows<'_>,
         ranks: Range<usize>,
-        cube: QueryCube,
+        queries: QueryBox,
         inside: &mut Block,
         rim: &mut Rim,
     ) {
-        let scale = _mm256_set1_ps(cube.scale);
-        let shift = cube.shift.map(|s| _mm256_set1_ps(s));
-        let half = _mm256_set1_ps(cube.half);
+        let scale = _mm256_set1_ps(queries.scale);
+        let shift = queries.shift.map(|s| _mm256_set1_ps(s));
+        let half = queries.half.map(|h| _mm256_set1_ps(h));
         let sign = _mm256_set1_ps(-0.0);
         let (zero, outside_limit, inside_limit) =
             (_mm256_setzero_ps(), _mm256_set1_ps(OUTSIDE), _mm256_set1_ps(INSIDE));
@@ -129,8 +129,8 @@ mod x86 {
                 offset[axis] = unsafe { _mm256_loadu_ps(rows[axis].add(start)) };
                 place[axis] = _mm256_fmadd_ps(offset[axis], scale, shift[axis]);
                 let size = _mm256_andnot_ps(sign, place[axis]);
-                let far = _mm256_add_ps(size, half);
-                let near = _mm256_max_ps(_mm256_sub_ps(size, half), zero);
+                let far = _mm256_add_ps(size, half[axis]);
+                let near = _mm256_max_ps(_mm256_sub_ps(size, half[axis]), zero);
                 nearest = _mm256_fmadd_ps(near, near, nearest);
                 farthest = _mm256_fmadd_ps(far, far, farthest);
             }
@@ -161,13 +161,13 @@ mod x86 {
     pub(super) unsafe fn split_avx512(
         rows: Rows<'_>,
         ranks: Range<usize>,
-        cube: QueryCube,
+        queries: QueryBox,
         inside: &mut Block,
         rim: &mut Rim,
     ) {
-        let scale = _mm512_set1_ps(cube.scale);
-        let shift = cube.shift.map(|s| _mm512_set1_ps(s));
-        let half = _mm512_set1_ps(cube.half);
+        let scale = _mm512_set1_ps(queries.scale);
+        let shift = queries.shift.map(|s| _mm512_set1_ps(s));
+        let half = queries.half.map(|h| _mm512_set1_ps(h));
         let (zero, outside_limit, inside_limit) =
             (_mm512_setzero_ps(), _mm512_set1_ps(OUTSIDE), _mm512_set1_ps(INSIDE));
         let rows = [rows.x.as_ptr(), rows.y.as_ptr(), rows.z.as_ptr()];
@@ -183,8 +183,8 @@ mod x86 {
                 offset[axis] = unsafe { _mm512_loadu_ps(rows[axis].add(start)) };
                 place[axis] = _mm512_fmadd_ps(offset[axis], scale, shift[axis]);
                 let size = _mm512_abs_ps(place[axis]);
-                let far = _mm512_add_ps(size, half);
-                let near = _mm512_max_ps(_mm512_sub_ps(size, half), zero);
+                let far = _mm512_add_ps(size, half[axis]);
+                let near = _mm512_max_ps(_mm512_sub_ps(size, half[axis]), zero);
                 nearest = _mm512_fmadd_ps(near, near, nearest);
                 farthest = _mm512_fmadd_ps(far, far, farthest);
             }
@@ -220,16 +220,16 @@ mod tests {
         };
         let [x, y, z] =
             [0, 1, 2].map(|seed| (0..PIECE + PADDING).map(|i| value(i, seed)).collect::<Vec<f32>>());
-        let cube = QueryCube { scale: 0.9, shift: [0.1, -0.2, 0.05], half: 0.125 };
+        let queries = QueryBox { scale: 0.9, shift: [0.1, -0.2, 0.05], half: [0.125, 0.25, 0.0625] };
         let square = |i: usize, side: f32| -> f32 {
             let place = [x[i] * 0.9 + 0.1, y[i] * 0.9 - 0.2, z[i] * 0.9 + 0.05];
-            place.map(|c| (c.abs() + side * 0.125).max(0.0).powi(2)).iter().sum()
+            [0, 1, 2].map(|a| (place[a].abs() + side * queries.half[a]).max(0.0).powi(2)).iter().sum()
         };
         for set in InstructionSet::available() {
             for len in [0, 1, 7, 8, 9, 15, 16, 17, 100, PIECE] {
                 let (mut inside, mut rim) = (Block::new(), Rim::default());
                 let rows = Rows { x: &x, y: &y, z: &z };
-                split(set, rows, 0..len, cube, &mut inside, &mut rim);
+                split(set, rows, 0..len, queries, &mut inside, &mut rim);
                 let all: Vec<usize> = (0..len).filter(|&i| square(i, 1.0) <= 1.0).collect();
                 let some: Vec<usize> =
                     (0..len).filter(|&i| square(i, 1.0) > 1.0 && square(i, -1.0) <= 1.0).collect();
