@@ -234,3 +234,19 @@ def test_the_nearest_in_place_of_a_radius(shell: Callable[..., Any], ball: Path,
     # A ball of radius 0.5, seen from outside; the forty nearest of its points are within 0.06.
     assert np.median(arrays["k2"]) == pytest.approx(2, rel=0.02)
     assert np.median(arrays["zeta"]) > 0.99
+
+
+def test_like_is_fitted_as_all_the_others(shell: Callable[..., Any], ball: Path, tmp_path: Path) -> None:
+    """The place that others are compared with had a paraboloid, where they had a quadric."""
+    out = tmp_path / "out.npz"
+    done = shell(
+        "extract", ball, "--radius", 0.45, "--fit", "quadric", "--like", "0,0,1.5", "-o", out, "--json"
+    )
+    assert done.code == 0, done.err
+    assert (json.loads(done.out)["fit"], json.loads(done.out)["robust"]) == ("quadric", False)
+    arrays = np.load(out)
+    # A ball of nearly the sphere's own radius: a paraboloid's curvature is half as much again.
+    used = (arrays["fit_used"] == surfsig.FitUsed.QUADRIC) & (arrays["points"][:, 2] < 1.7)
+    assert used.sum() > 3000
+    assert np.median(arrays["k1"][used]) == pytest.approx(2, rel=1e-4)
+    assert arrays["zeta"][used].min() > 0.99999

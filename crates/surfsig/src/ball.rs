@@ -1,8 +1,7 @@
-//! The walk over the points of a ball, and the two traits that meet there.
+//! The walk over the points of a ball, and the trait of those who look at them.
 //!
 //! A [`BallVisitor`] is told the members of a ball, block by block; what it makes of them is its own
-//! affair: moments today, a robust re-weighting or a pooled descriptor as well. A [`MomentSource`]
-//! gives the 35 sums of a ball, whichever way it comes by them.
+//! affair: moments today, a robust re-weighting or a pooled descriptor as well.
 
 use crate::block_sums::BlockSums;
 use crate::cell_index::{CellIndex, Row, RowKey};
@@ -18,23 +17,6 @@ pub(crate) trait BallVisitor {
     /// The first `len` members of the block: offsets from the query in units of the radius. The
     /// slots from there to the next multiple of 16 are zero.
     fn visit(&mut self, block: &Block, len: usize);
-}
-
-/// Gives the moments of the ball around a query.
-///
-/// Queries come in runs: [`enter_row`](Self::enter_row), then [`enter_run`](Self::enter_run) for
-/// some queries near to each other in that row, then [`moments`](Self::moments) for each. What
-/// queries share can so be prepared once.
-pub(crate) trait MomentSource {
-    /// The queries that follow are in this row of the lattice.
-    fn enter_row(&mut self, key: RowKey);
-
-    /// The queries that follow have their offsets from the row's middle in this box.
-    fn enter_run(&mut self, low: [f32; 3], high: [f32; 3]);
-
-    /// The moments of the ball around the query at this offset from the row's middle, about the
-    /// query, in units of the radius. `S` is what the sums within a block are kept in.
-    fn moments<S: Scalar>(&mut self, offset: [f32; 3]) -> Moments<f64>;
 }
 
 /// A row that balls around the present row's queries may reach.
@@ -126,8 +108,12 @@ pub(crate) fn finish<V: BallVisitor>(block: &mut Block, visitor: &mut V) {
     visitor.visit(block, len);
 }
 
-impl MomentSource for DirectWalk<'_> {
-    fn enter_row(&mut self, key: RowKey) {
+/// Queries come in runs: [`enter_row`](Self::enter_row), then [`enter_run`](Self::enter_run) for
+/// some queries near to each other in that row, then [`moments`](Self::moments) for each. What
+/// queries share is so prepared once.
+impl DirectWalk<'_> {
+    /// The queries that follow are in this row of the lattice.
+    pub fn enter_row(&mut self, key: RowKey) {
         if self.row.replace(key) == Some(key) {
             return;
         }
@@ -155,7 +141,8 @@ impl MomentSource for DirectWalk<'_> {
         }
     }
 
-    fn enter_run(&mut self, low: [f32; 3], high: [f32; 3]) {
+    /// The queries that follow have their offsets from the row's middle in this box.
+    pub fn enter_run(&mut self, low: [f32; 3], high: [f32; 3]) {
         // A window may be too long, never too short: a little more than the ball's own slack, and
         // than float32 can lose over the length of a row.
         let reach = self.index.lattice.radius as f32 * (1.0 + 2e-5);
@@ -184,7 +171,9 @@ impl MomentSource for DirectWalk<'_> {
         }
     }
 
-    fn moments<S: Scalar>(&mut self, offset: [f32; 3]) -> Moments<f64> {
+    /// The moments of the ball around the query at this offset from the row's middle, about the
+    /// query, in units of the radius. `S` is what the sums within a block are kept in.
+    pub fn moments<S: Scalar>(&mut self, offset: [f32; 3]) -> Moments<f64> {
         let mut sums = BlockSums::<S>::new(self.set);
         self.visit(offset, &mut sums);
         sums.total

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -118,48 +119,42 @@ def extract_command(
         raise click.UsageError("--at and --voxel exclude each other")
     check_writable(output)
     shown = on_terminal() and not quiet
+    how = {"radius": radius, "neighbors": neighbors, "axes": axes, "fit": fit, "robust": robust}
     clock = [time.perf_counter()]
     with progress_bar("reading", "bytes", shown=shown) as progress:
         cloud = surfsig.read(file, progress=progress, **reading)
     clock.append(time.perf_counter())
     with progress_bar("extracting", "points", shown=shown) as progress:
-        result = surfsig.extract(
+        extract = partial(
+            surfsig.extract,
             cloud,
             radius,
             neighbors=neighbors,
             axes=axes,
             fit=fit,
-            at=np.array(at) if at else None,
-            voxel=voxel,
             viewpoint=viewpoint,
             robust=robust,
             threads=threads,
-            progress=progress,
         )
+        result = extract(at=np.array(at) if at else None, voxel=voxel, progress=progress)
     clock.append(time.perf_counter())
     typical = float(np.median(result.radius)) if len(result) else np.nan
     status = result.status.copy()
     columns: dict[str, ArrayLike] = {**result.columns(), "status": status}
     if like is not None:
-        columns["zeta"] = _similarity_to(like, cloud, result, radius, neighbors, viewpoint)
+        columns["zeta"] = _similarity_to(like, result, extract(at=[like]))
     with progress_bar("writing", "points", shown=shown) as progress:
         write(
             output,
             cloud if not at and voxel is None else _part_of(cloud, result),
             columns,
             chunks=_signature_chunks(result, status) if signatures else None,
-            notes=_notes(radius, neighbors, axes),
+            notes={name: str(value) for name, value in how.items() if value is not None},
             progress=progress,
         )
     clock.append(time.perf_counter())
     seconds = dict(zip(("read", "extract", "write"), np.diff(clock).tolist(), strict=True))
-    summary: dict[str, Any] = {
-        "input": str(file),
-        "output": str(output),
-        "radius": radius,
-        "neighbors": neighbors,
-    }
-    summary |= {"axes": axes}
+    summary: dict[str, Any] = {"input": str(file), "output": str(output), **how}
     summary |= {"signatures": signatures, **_summary(result, status), "seconds": seconds}
     summary["points_per_second"] = len(result) / seconds["extract"] if seconds["extract"] else None
     if len(result) and not np.isfinite(result.k1).any():
@@ -172,36 +167,23 @@ def extract_command(
         print_table(f"{output}, radius {number(typical)}, {axes} axes", _rows(summary), err=True)
 
 
-def _notes(radius: float | None, neighbors: int | None, axes: Axes) -> dict[str, str]:
-    given = {"radius": radius, "neighbors": neighbors}
-    return {name: repr(value) for name, value in given.items() if value is not None} | {"axes": axes}
-
-
 def _part_of(cloud: PointCloud, result: Extraction) -> PointCloud:
     """Give the places of the result, with the input's fields where they are points of the input."""
     from surfsig import PointCloud
 
-    chosen = result.indices
-    fields = {} if chosen is None else {name: values[chosen] for name, values in cloud.fields.items()}
-    return PointCloud(result.points, viewpoint=cloud.viewpoint, fields=fields)
+    if result.indices is not None:
+        return cloud.at(result.indices)
+    return PointCloud(result.points, viewpoint=cloud.viewpoint)
 
 
 def _similarity_to(
-    place: tuple[float, float, float],
-    cloud: PointCloud,
-    result: Extraction,
-    radius: float | None,
-    neighbors: int | None,
-    viewpoint: tuple[float, float, float] | None,
+    place: tuple[float, float, float], result: Extraction, there: Extraction
 ) -> NDArray[np.float32]:
     """Compare all places with one, with a flat atom as long as the whole scan's noise asks for."""
     import numpy as np
 
     import surfsig
 
-    there = surfsig.extract(
-        cloud, radius, neighbors=neighbors, axes=result.axes, at=[place], viewpoint=viewpoint
-    )
     typical = result if len(result) > 1 else there
     noise, count = np.nanmedian(typical.residual), np.median(typical.count)
     flat = surfsig.flat_atom_length(float(noise), float(np.median(typical.radius)), float(count))

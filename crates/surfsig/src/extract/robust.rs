@@ -1,6 +1,6 @@
 //! A fit that outliers do not pull: the points are looked at again, and those far from the surface leave.
 
-use crate::fit::paraboloid::Paraboloids;
+use crate::fit::paraboloid::{Paraboloids, UNKNOWNS};
 use crate::members::Members;
 use crate::moments::Moments;
 use crate::simd::InstructionSet;
@@ -18,16 +18,23 @@ const DEVIATIONS_PER_MEDIAN: f64 = 1.4826;
 /// Distances, in radii, that rounding alone makes.
 const ROUNDING: f64 = 1e-6;
 
-/// The moments of the members near the fitted surface, or `None` where no other members are than were fitted.
+/// Of each member, in their order, how far it is from the surface, in radii; and the same to be sorted.
+#[derive(Default)]
+pub(super) struct Distances {
+    of_members: Vec<f64>,
+    sorted: Vec<f64>,
+}
+
+/// The moments of the members near the fitted surface, or `None` where they are too few to judge, or there is
+/// no surface.
 ///
 /// What is far is judged by the median distance of all members, which outliers hardly move.
 pub(super) fn without_outliers(
     members: &mut Members,
     fits: &Paraboloids,
     lane: usize,
-    fitted: f64,
     set: InstructionSet,
-    distances: &mut Vec<f64>,
+    distances: &mut Distances,
 ) -> Option<Moments<f64>> {
     let [u, v, w] = [&fits.axes.u, &fits.axes.v, &fits.axes.w].map(|axis| axis.map(|c| c.0[lane]));
     let [a, b, c, d, e, f] = fits.coefficients.map(|c| c.0[lane]);
@@ -39,14 +46,16 @@ pub(super) fn without_outliers(
         let (slope_x, slope_y) = (2.0 * a * x + e * y + c, 2.0 * b * y + e * x + d);
         height.abs() / (1.0 + slope_x * slope_x + slope_y * slope_y).sqrt()
     };
-    distances.clear();
-    distances.extend(members.points.iter().map(distance));
-    if distances.len() < 7 || !distances.iter().all(|d| d.is_finite()) {
+    let Distances { of_members, sorted } = distances;
+    of_members.clear();
+    of_members.extend(members.points.iter().map(distance));
+    if of_members.len() <= UNKNOWNS || !of_members.iter().all(|d| d.is_finite()) {
         return None;
     }
-    let middle = distances.len() / 2;
-    let median = *distances.select_nth_unstable_by(middle, f64::total_cmp).1;
+    sorted.clone_from(of_members);
+    let middle = sorted.len() / 2;
+    let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
     let limit = (FAR * DEVIATIONS_PER_MEDIAN * median).max(ROUNDING);
-    let moments = members.moments::<f64>(set, |point| distance(point) <= limit);
-    (moments.count() != fitted).then_some(moments)
+    let mut near = of_members.iter().map(|d| *d <= limit);
+    Some(members.moments::<f64>(set, |_| near.next() == Some(true)))
 }

@@ -1,14 +1,14 @@
 //! One thread's share of the loop over points.
 
 use super::columns::{ColumnsPart, Fit};
-use super::robust::{self, without_outliers};
+use super::robust::{self, Distances, without_outliers};
 use super::{ExtractOptions, Monitor, Neighborhood};
 use crate::Error;
-use crate::ball::{DirectWalk, MomentSource};
+use crate::ball::DirectWalk;
 use crate::cell_index::{CellIndex, Row, RowKey};
 use crate::fit::FitKind;
 use crate::fit::paraboloid::{Paraboloids, Task, fit_paraboloids};
-use crate::fit::quadric::{Quadrics, fit_quadrics};
+use crate::fit::quadric::fit_quadrics;
 use crate::fit::tensor::{MomentBatch, Vector};
 use crate::hierarchy::HierarchicalWalk;
 use crate::members::Members;
@@ -32,7 +32,7 @@ pub(super) struct Worker<'a> {
     pub moments: Vec<Moments<f64>>,
     /// Of each pending query, where its points are looked at more than once.
     members: Vec<Members>,
-    distances: Vec<f64>,
+    distances: Distances,
 }
 
 /// A query whose moments wait for their batch.
@@ -61,7 +61,7 @@ impl<'a> Worker<'a> {
         let (walk, hierarchical) = (DirectWalk::new(index, set), HierarchicalWalk::new(index, set));
         let (pending, moments) = (Vec::with_capacity(LANES), Vec::with_capacity(LANES));
         let members = (0..LANES).map(|_| Members::new()).collect();
-        let distances = Vec::new();
+        let distances = Distances::default();
         Self { walk, hierarchical, asked, neighborhood, options, set, pending, moments, members, distances }
     }
 
@@ -163,7 +163,7 @@ impl<'a> Worker<'a> {
         if self.pending.is_empty() {
             return false;
         }
-        let mut fits = self.fit();
+        let mut fits = self.fit(fit_paraboloids);
         let weak = |lane: &usize| !self.exact() && fits.needs_f64.get(*lane);
         let again: Vec<usize> = (0..self.pending.len()).filter(weak).collect();
         for &lane in &again {
@@ -178,12 +178,12 @@ impl<'a> Worker<'a> {
             };
         }
         if !again.is_empty() {
-            fits = self.fit();
+            fits = self.fit(fit_paraboloids);
         }
         if self.options.robust {
             fits = self.fit_without_outliers(fits);
         }
-        let quadrics = self.fit_quadrics();
+        let quadrics = self.exact().then(|| self.fit(fit_quadrics));
         for (lane, (query, moments)) in self.pending.iter().zip(&self.moments).enumerate() {
             let quadric = quadrics.as_ref().filter(|quadrics| match self.options.fit {
                 FitKind::Auto => quadrics.preferred.get(lane),
@@ -202,9 +202,9 @@ impl<'a> Worker<'a> {
         for _ in 0..robust::MAX_PASSES {
             let mut changed = false;
             for lane in 0..self.pending.len() {
-                let fitted = self.moments[lane].count();
                 let (members, distances) = (&mut self.members[lane], &mut self.distances);
-                if let Some(moments) = without_outliers(members, &fits, lane, fitted, self.set, distances) {
+                let moments = without_outliers(members, &fits, lane, self.set, distances);
+                if let Some(moments) = moments.filter(|moments| *moments != self.moments[lane]) {
                     self.moments[lane] = moments;
                     changed = true;
                 }
@@ -212,25 +212,15 @@ impl<'a> Worker<'a> {
             if !changed {
                 break;
             }
-            fits = self.fit();
+            fits = self.fit(fit_paraboloids);
         }
         fits
     }
 
-    fn fit(&self) -> Paraboloids {
+    /// Fits one kind of surface to all pending queries.
+    fn fit<T>(&self, fit: fn(InstructionSet, &Task<'_>) -> T) -> T {
         let moments = &MomentBatch::new(&self.moments);
-        let (axes, to_sensor) = (self.options.axes, self.to_sensor());
-        fit_paraboloids(self.set, &Task { moments, axes, to_sensor })
-    }
-
-    /// The implicit quadrics, where they are asked for.
-    fn fit_quadrics(&self) -> Option<Quadrics> {
-        if self.options.fit == FitKind::Paraboloid {
-            return None;
-        }
-        let moments = &MomentBatch::new(&self.moments);
-        let (axes, to_sensor) = (self.options.axes, self.to_sensor());
-        Some(fit_quadrics(self.set, &Task { moments, axes, to_sensor }))
+        fit(self.set, &Task { moments, axes: self.options.axes, to_sensor: self.to_sensor() })
     }
 
     /// From each pending query to the side from which it was seen, where somebody knows.

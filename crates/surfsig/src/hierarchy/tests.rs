@@ -1,7 +1,7 @@
 //! The hierarchy against the walk over the points themselves.
 
 use super::{CELLS_PER_REGION, HierarchicalWalk};
-use crate::ball::{DirectWalk, MomentSource};
+use crate::ball::DirectWalk;
 use crate::cell_index::{CELLS_PER_ROW, CellIndex, RowKey};
 use crate::moments::Moments;
 use crate::simd::InstructionSet;
