@@ -205,12 +205,14 @@ def test_bar_and_table_on_a_terminal(ball: Path, tmp_path: Path) -> None:
 
 
 def test_ctrl_c_keeps_the_old_output(tmp_path: Path) -> None:
-    # Every point has every other within its radius: minutes of work, if nobody stops it.
+    # Every point has every other as a neighbour, and a number of them spares no look: minutes of work.
     points = np.random.default_rng(0).normal(size=(400_000, 3)).astype(np.float32)
     write(tmp_path / "dense.ply", PointCloud(points))
     out = tmp_path / "out.ply"
     out.write_bytes(b"old")
-    process, end = start_on_terminal("extract", tmp_path / "dense.ply", "--radius", 20, "-o", out)
+    process, end = start_on_terminal(
+        "extract", tmp_path / "dense.ply", "--radius", 20, "--neighbors", 400_000, "-o", out
+    )
     shown = read_terminal(end, until=b"extracting")
     time.sleep(0.5)
     process.send_signal(signal.SIGINT)

@@ -19,7 +19,7 @@ import numpy as np
 import surfsig
 points = np.random.default_rng(0).uniform(-1, 1, (200_000, 3)).astype(np.float32)
 print("ready", flush=True)
-surfsig.extract(points, 0.5, threads=1)
+surfsig.extract(points, 0.5, neighbors=100_000, threads=1)
 """
 
 
