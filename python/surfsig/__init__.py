@@ -13,7 +13,7 @@ surfsig.similarity(w[0], w[1])             # zeta, between 0 and 1
 
 from surfsig._surfsig import INSTRUCTION_SET, Frame, __version__
 from surfsig.clean import crop, downsample, remove_outliers
-from surfsig.curvature import extract
+from surfsig.curvature import extract, extract_radii
 from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
 from surfsig.extraction import Extraction, FitUsed, Status
 from surfsig.files import read, write
@@ -35,6 +35,7 @@ __all__ = [
     "crop",
     "downsample",
     "extract",
+    "extract_radii",
     "flat_atom_length",
     "flipped",
     "read",

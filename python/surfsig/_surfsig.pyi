@@ -29,7 +29,7 @@ def extract(
     points: NDArray[np.floating],
     *,
     origin: Sequence[float],
-    radius: float | None,
+    radius: float | Sequence[float] | str | None,
     axes: str,
     fit: str,
     neighbors: int | None = None,
@@ -39,7 +39,7 @@ def extract(
     robust: bool = False,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> dict[str, NDArray[Any]]: ...
+) -> list[dict[str, NDArray[Any]]]: ...
 def voxel_representatives(
     points: NDArray[np.floating], *, origin: Sequence[float], voxel: float
 ) -> NDArray[np.uint32]: ...

@@ -1,9 +1,10 @@
-"""From points to curvature: `extract`."""
+"""From points to curvature: `extract`, and `extract_radii` for several radii at once."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal, SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +26,7 @@ from surfsig.point_cloud import PointCloud
 
 def extract(
     cloud: PointCloud | ArrayLike,
-    radius: float | None = None,
+    radius: float | Literal["auto"] | None = None,
     *,
     neighbors: int | None = None,
     axes: Axes = AXES,
@@ -47,7 +48,11 @@ def extract(
         ...). Points that are not finite belong to no ball.
     radius
         Radius of the ball around each place, in the cloud's own unit; half the side D of the paper's
-        patch. Finite and above 0. May be left out where `neighbors` is given.
+        patch. Finite and above 0. May be left out where `neighbors` is given. "auto": for each place the
+        largest of the radii 2^(i/2), i a whole number, that the fit still explains: from the smallest ball
+        with 16 points on, as long as the next larger one has curvatures that do not differ significantly,
+        points that are no farther from the surface, and a smaller standard error. `Extraction.radius` says
+        which; only points near to a place count. In the surface's axes only.
     neighbors
         That many nearest points, the place itself included where it is a point of the cloud; together
         with `radius` at most that many of the points within it (a hybrid search).
@@ -91,53 +96,133 @@ def extract(
     InvalidInputError
         If an argument has no meaning; its text says which.
     """
-    cloud = PointCloud.of(cloud)
     if radius is None and neighbors is None:
         raise InvalidInputError("give a radius, or neighbors, or both")
-    size = None if radius is None else positive_length(radius, "radius")
+    if isinstance(radius, str):
+        if radius != "auto":
+            raise InvalidInputError(f"radius must be a number or 'auto', not {radius!r:.40}")
+        if neighbors is not None:
+            raise InvalidInputError("radius='auto' and neighbors exclude each other")
+        if axes == "sensor":
+            raise InvalidInputError("radius='auto' chooses by standard errors, which axes='sensor' has not")
+    job = _Job(axes, fit, at, voxel, viewpoint, normals, robust, threads, progress)
+    size = positive_length(radius, "radius") if isinstance(radius, SupportsFloat) else radius
     most = None if neighbors is None else whole_number(neighbors, "neighbors", MOST_NEIGHBORS)
-    if axes not in ("surface", "sensor"):
-        raise InvalidInputError(f"axes must be 'surface' or 'sensor', not {axes!r}")
-    if fit not in ("paraboloid", "quadric", "auto"):
-        raise InvalidInputError(f"fit must be 'paraboloid', 'quadric' or 'auto', not {fit!r}")
-    if fit != "paraboloid" and axes == "sensor":
-        raise InvalidInputError("only fit='paraboloid' is fitted in the sensor's axes")
-    if at is not None and voxel is not None:
-        raise InvalidInputError("at and voxel exclude each other")
-    origin: Sequence[float] = cloud.origin.tolist()
-    indices: NDArray[np.int64] | None
-    query: NDArray[np.uint32] | NDArray[np.float64] | None
-    if voxel is not None:
-        query = _surfsig.voxel_representatives(
-            cloud.offsets, origin=origin, voxel=positive_length(voxel, "voxel")
+    return job.run(PointCloud.of(cloud), size, most)[0]
+
+
+def extract_radii(
+    cloud: PointCloud | ArrayLike,
+    radii: Sequence[float],
+    *,
+    axes: Axes = AXES,
+    fit: Fit = FIT,
+    at: ArrayLike | None = None,
+    voxel: float | None = None,
+    viewpoint: ArrayLike | None = None,
+    normals: ArrayLike | None = None,
+    robust: bool = False,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> list[Extraction]:
+    """Extract curvature from balls of several radii around each place, in one pass over the points.
+
+    Values differ from those of `extract` with one radius by rounding only: |dk| <= 1e-5 max(|k|, 1 / radius).
+
+    Parameters
+    ----------
+    cloud, axes, fit, at, voxel, viewpoint, normals, robust, threads
+        As in `extract`.
+    radii
+        Radii of the balls, in the cloud's own unit.
+    progress
+        Called with the number of balls done and their total.
+
+    Returns
+    -------
+    list of Extraction
+        One for each radius, in their order.
+
+    Raises
+    ------
+    InvalidInputError
+        If an argument has no meaning; its text says which.
+    """
+    if isinstance(radii, str) or not np.iterable(radii):
+        raise InvalidInputError(f"radii must be some numbers, not {radii!r:.40}")
+    sizes = [positive_length(radius, "radius") for radius in radii]
+    job = _Job(axes, fit, at, voxel, viewpoint, normals, robust, threads, progress)
+    return job.run(PointCloud.of(cloud), sizes, None)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """How curvature is extracted, whatever the neighbourhoods are."""
+
+    axes: Axes
+    fit: Fit
+    at: ArrayLike | None
+    voxel: float | None
+    viewpoint: ArrayLike | None
+    normals: ArrayLike | None
+    robust: bool
+    threads: int | None
+    progress: Callable[[int, int], object] | None
+
+    def run(
+        self, cloud: PointCloud, radius: float | Sequence[float] | str | None, neighbors: int | None
+    ) -> list[Extraction]:
+        """Extract, once for each radius."""
+        self._check()
+        origin: Sequence[float] = cloud.origin.tolist()
+        query, indices, points = self._places(cloud)
+        sensor, directions = orientation(cloud, self.viewpoint, self.normals, indices)
+        found: list[dict[str, Any]] = _surfsig.extract(
+            cloud.offsets,
+            origin=origin,
+            radius=radius,
+            axes=self.axes,
+            fit=self.fit,
+            neighbors=neighbors,
+            at=query,
+            viewpoint=None if sensor is None else sensor.tolist(),
+            directions=directions,
+            robust=self.robust,
+            threads=thread_count(self.threads),
+            progress=self.progress,
         )
-        indices, points = query.astype(np.int64), cloud.points[query]
-    elif at is None:
-        query, points = None, cloud.points
-        indices = np.arange(len(cloud))
-    else:
-        query, indices = query_places(at, len(cloud))
-        points = query if indices is None else cloud.points[indices]
-    sensor, directions = orientation(cloud, viewpoint, normals, indices)
-    arrays: dict[str, Any] = _surfsig.extract(
-        cloud.offsets,
-        origin=origin,
-        radius=size,
-        axes=axes,
-        fit=fit,
-        neighbors=most,
-        at=query,
-        viewpoint=None if sensor is None else sensor.tolist(),
-        directions=directions,
-        robust=robust,
-        threads=thread_count(threads),
-        progress=progress,
-    )
-    return Extraction(
-        radius=arrays.pop("radius", size),
-        **arrays,
-        axes=axes,
-        oriented=sensor is not None or directions is not None,
-        points=points,
-        indices=indices,
-    )
+        sizes = radius if isinstance(radius, Sequence) and not isinstance(radius, str) else [radius]
+        return [
+            Extraction(
+                radius=arrays.pop("radius", size),
+                **arrays,
+                axes=self.axes,
+                oriented=sensor is not None or directions is not None,
+                points=points,
+                indices=indices,
+            )
+            for size, arrays in zip(sizes, found, strict=True)
+        ]
+
+    def _check(self) -> None:
+        if self.axes not in ("surface", "sensor"):
+            raise InvalidInputError(f"axes must be 'surface' or 'sensor', not {self.axes!r}")
+        if self.fit not in ("paraboloid", "quadric", "auto"):
+            raise InvalidInputError(f"fit must be 'paraboloid', 'quadric' or 'auto', not {self.fit!r}")
+        if self.fit != "paraboloid" and self.axes == "sensor":
+            raise InvalidInputError("only fit='paraboloid' is fitted in the sensor's axes")
+        if self.at is not None and self.voxel is not None:
+            raise InvalidInputError("at and voxel exclude each other")
+
+    def _places(
+        self, cloud: PointCloud
+    ) -> tuple[NDArray[np.uint32] | NDArray[np.float64] | None, NDArray[np.int64] | None, NDArray[Any]]:
+        """Return the places as the core takes them, their numbers in the cloud, and where they are."""
+        if self.voxel is not None:
+            voxel = positive_length(self.voxel, "voxel")
+            chosen = _surfsig.voxel_representatives(cloud.offsets, origin=cloud.origin.tolist(), voxel=voxel)
+            return chosen, chosen.astype(np.int64), cloud.points[chosen]
+        if self.at is None:
+            return None, np.arange(len(cloud)), cloud.points
+        query, indices = query_places(self.at, len(cloud))
+        return query, indices, query if indices is None else cloud.points[indices]

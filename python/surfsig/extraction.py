@@ -65,8 +65,8 @@ class Extraction:
     """
 
     radius: float | FloatArray
-    """Radius of the balls; with `neighbors` each place's own, (m,): the distance to the farthest point
-    that counts, or the radius asked for where there are no more points within it."""
+    """Radius of the balls; with "auto" each place's own, (m,); with `neighbors` too: the distance to the
+    farthest point that counts, or the radius asked for where there are no more points within it."""
     axes: Axes
     """Axes in which the paraboloids were fitted."""
     oriented: bool

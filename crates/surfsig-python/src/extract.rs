@@ -38,18 +38,62 @@ pub enum At<'py> {
     Positions(PyReadonlyArray2<'py, f64>),
 }
 
-/// Which points around a place count, from what the caller gave of radius and number.
-fn neighborhood(radius: Option<f64>, neighbors: Option<usize>) -> PyResult<Neighborhood> {
-    let radius = radius.map(Radius::new).transpose().map_err(to_python)?;
-    match (radius, neighbors) {
-        (Some(radius), Some(most)) => Ok(Neighborhood::Hybrid { radius, most }),
-        (Some(radius), None) => Ok(Neighborhood::Ball(radius)),
-        (None, Some(k)) => Ok(Neighborhood::Nearest(k)),
-        (None, None) => Err(PyValueError::new_err("neither radius nor neighbors")),
+/// What the caller gave as the radius.
+#[derive(FromPyObject)]
+pub enum Size {
+    One(f64),
+    Several(Vec<f64>),
+    /// "auto".
+    Word(String),
+}
+
+/// What is to be done, from what the caller gave of radius and number.
+enum Job {
+    Neighborhood(Neighborhood),
+    Radii(Vec<Radius>),
+    AutoRadius,
+}
+
+impl Job {
+    fn of(radius: Option<Size>, neighbors: Option<usize>) -> PyResult<Self> {
+        let checked = |radius| Radius::new(radius).map_err(to_python);
+        Ok(match (radius, neighbors) {
+            (Some(Size::One(radius)), Some(most)) => {
+                Self::Neighborhood(Neighborhood::Hybrid { radius: checked(radius)?, most })
+            }
+            (Some(Size::One(radius)), None) => Self::Neighborhood(Neighborhood::Ball(checked(radius)?)),
+            (None, Some(k)) => Self::Neighborhood(Neighborhood::Nearest(k)),
+            (Some(Size::Several(radii)), None) => {
+                Self::Radii(radii.into_iter().map(checked).collect::<PyResult<_>>()?)
+            }
+            (Some(Size::Word(word)), None) if word == "auto" => Self::AutoRadius,
+            _ => return Err(PyValueError::new_err("give a radius, radii, 'auto', or neighbors")),
+        })
+    }
+
+    /// How often a monitor counts each query.
+    fn counts(&self) -> usize {
+        if let Self::Radii(radii) = self { radii.len() } else { 1 }
+    }
+
+    fn run(
+        &self,
+        cloud: &PointCloud<'_>,
+        queries: &Queries<'_>,
+        options: &ExtractOptions<'_>,
+        monitor: &Monitor,
+    ) -> Result<Vec<Extraction>, surfsig::Error> {
+        match self {
+            Self::Neighborhood(neighborhood) => {
+                Ok(vec![surfsig::extract_monitored(cloud, *neighborhood, queries, options, monitor)?])
+            }
+            Self::Radii(radii) => surfsig::extract_radii(cloud, radii, queries, options, monitor),
+            Self::AutoRadius => Ok(vec![surfsig::extract_auto_radius(cloud, queries, options, monitor)?]),
+        }
     }
 }
 
-/// Extract curvature; see `surfsig.extract` for what the arguments and the arrays mean.
+/// Extract curvature, once for each radius; see `surfsig.extract` for what the arguments and the arrays mean.
 #[pyfunction]
 #[pyo3(signature = (points, *, origin, radius, axes, fit, neighbors=None, at=None, viewpoint=None, directions=None, robust=false, threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
@@ -57,7 +101,7 @@ pub fn extract<'py>(
     py: Python<'py>,
     points: Points<'py>,
     origin: [f64; 3],
-    radius: Option<f64>,
+    radius: Option<Size>,
     axes: &str,
     fit: &str,
     neighbors: Option<usize>,
@@ -67,7 +111,7 @@ pub fn extract<'py>(
     robust: bool,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<Vec<Bound<'py, PyDict>>> {
     let cloud = points.cloud(origin)?;
     let queries = match &at {
         None => Queries::All,
@@ -85,21 +129,21 @@ pub fn extract<'py>(
         "auto" => FitKind::Auto,
         other => return Err(PyValueError::new_err(format!("unknown fit '{other}'"))),
     };
-    let neighborhood = neighborhood(radius, neighbors)?;
+    let job = Job::of(radius, neighbors)?;
     let directions = directions.as_ref().map(rows::<f32, 3>).transpose()?;
     let options = ExtractOptions { axes, fit, viewpoint, directions, robust, threads, instruction_set: None };
     let monitor = Monitor::default();
-    let total = queries.len(&cloud);
-    let run = || surfsig::extract_monitored(&cloud, neighborhood, &queries, &options, &monitor);
+    let total = queries.len(&cloud) * job.counts();
+    let run = || job.run(&cloud, &queries, &options, &monitor);
     let report = || -> PyResult<()> {
         Python::attach(|py| {
             py.check_signals()?;
             progress.as_ref().map_or(Ok(()), |call| call.call1(py, (monitor.done(), total)).map(|_| ()))
         })
     };
-    let extraction = py.detach(|| watched(run, report, || monitor.cancel()))?;
+    let extractions = py.detach(|| watched(run, report, || monitor.cancel()))?;
     report()?;
-    to_arrays(py, extraction)
+    extractions.into_iter().map(|extraction| to_arrays(py, extraction)).collect()
 }
 
 /// Runs the work on a thread of its own, so that this one can answer Ctrl-C.

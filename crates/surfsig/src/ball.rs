@@ -7,7 +7,7 @@ use crate::block_sums::BlockSums;
 use crate::cell_index::{CellIndex, Row, RowKey};
 use crate::moments::{Moments, Scalar};
 use crate::simd::InstructionSet;
-use crate::simd::select::{BLOCK, Ball, Block, PADDING, Place, Rows, Window, gather};
+use crate::simd::select::{BLOCK, Ball, Block, Place, Rows, Window, gather};
 
 /// Sees every point of a ball once, in the order of the lattice.
 pub(crate) trait BallVisitor {
@@ -100,12 +100,8 @@ pub(crate) fn visit_members<V: BallVisitor>(
 
 /// Shows a visitor what is left in a block.
 pub(crate) fn finish<V: BallVisitor>(block: &mut Block, visitor: &mut V) {
-    let len = block.len;
-    let padding = len..len.next_multiple_of(PADDING);
-    block.x[padding.clone()].fill(0.0);
-    block.y[padding.clone()].fill(0.0);
-    block.z[padding].fill(0.0);
-    visitor.visit(block, len);
+    block.pad();
+    visitor.visit(block, block.len);
 }
 
 /// Queries come in runs: [`enter_row`](Self::enter_row), then [`enter_run`](Self::enter_run) for

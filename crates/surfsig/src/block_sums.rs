@@ -24,9 +24,13 @@ impl<S: Scalar> BallVisitor for BlockSums<S> {
     const WANTS_RANKS: bool = false;
 
     fn visit(&mut self, block: &Block, len: usize) {
-        let sums = accumulate::<S>(self.set, block, len);
-        for (total, sum) in self.total.sums.iter_mut().zip(sums) {
-            *total += sum.to_f64();
-        }
+        add_block::<S>(&mut self.total, self.set, block, len);
+    }
+}
+
+/// Adds the sums of a block's first `len` points, taken in `S`, to a total.
+pub(crate) fn add_block<S: Scalar>(total: &mut Moments<f64>, set: InstructionSet, block: &Block, len: usize) {
+    for (total, sum) in total.sums.iter_mut().zip(accumulate::<S>(set, block, len)) {
+        *total += sum.to_f64();
     }
 }

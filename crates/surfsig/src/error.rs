@@ -44,6 +44,9 @@ pub enum Error {
     /// An implicit quadric has no sensor's axes.
     #[error("only a paraboloid is fitted in the sensor's axes")]
     QuadricInSensorAxes,
+    /// Radii are chosen by standard errors, which the sensor's axes do not have.
+    #[error("a radius is chosen in the surface's axes only; give one for the sensor's")]
+    AutoRadiusInSensorAxes,
     /// More points than 32-bit ranks can number.
     #[error("a cloud of {0} points is too large: at most 4294967295 are numbered; cut it into tiles")]
     TooManyPoints(usize),

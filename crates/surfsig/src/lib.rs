@@ -41,6 +41,7 @@ mod hierarchy;
 mod members;
 mod moments;
 mod point_cloud;
+mod shells;
 mod simd;
 mod similarity;
 mod threads;
@@ -49,8 +50,8 @@ pub use cell_index::CellIndex;
 pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
 pub use error::Error;
 pub use extract::{
-    ExtractOptions, Extraction, Monitor, Neighborhood, Queries, Status, extract, extract_monitored,
-    voxel_representatives,
+    ExtractOptions, Extraction, Monitor, Neighborhood, Queries, Status, extract, extract_auto_radius,
+    extract_monitored, extract_radii, voxel_representatives,
 };
 pub use fit::{
     Cylinder, FitAxes, FitKind, FitUsed, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere,

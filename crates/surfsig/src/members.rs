@@ -1,10 +1,10 @@
 //! The visitor that remembers: a ball's points, for what needs to look at them more than once.
 
-use crate::ball::{BallVisitor, DirectWalk};
+use crate::ball::{BallVisitor, DirectWalk, finish};
 use crate::block_sums::BlockSums;
 use crate::moments::{Moments, Scalar};
 use crate::simd::InstructionSet;
-use crate::simd::select::{BLOCK, Block, PADDING};
+use crate::simd::select::{BLOCK, Block};
 
 /// The members of a ball in the order of the lattice, from the query, in units of the radius.
 pub(crate) struct Members {
@@ -77,10 +77,8 @@ impl Members {
                 len = 0;
             }
         }
-        for i in len..len.next_multiple_of(PADDING) {
-            (block.x[i], block.y[i], block.z[i]) = (0.0, 0.0, 0.0);
-        }
-        sums.visit(block, len);
+        block.len = len;
+        finish(block, &mut sums);
         sums.total
     }
 }

@@ -91,31 +91,26 @@ impl Extraction {
         if self.radii.is_empty() { self.radius } else { f64::from(self.radii[index]) }
     }
 
-    /// Takes over the values of some queries, by their numbers, from another extraction.
-    pub(super) fn replace(&mut self, queries: &[usize], with: &Self) {
-        fn take<T: Copy>(column: &mut [T], queries: &[usize], with: &[T]) {
-            for (&query, &value) in queries.iter().zip(with) {
-                column[query] = value;
-            }
-        }
-        self.radius = with.radius;
-        take(&mut self.radii, queries, &with.radii);
-        take(&mut self.k1, queries, &with.k1);
-        take(&mut self.k2, queries, &with.k2);
-        take(&mut self.normals, queries, &with.normals);
-        take(&mut self.directions, queries, &with.directions);
-        take(&mut self.residual, queries, &with.residual);
-        take(&mut self.condition, queries, &with.condition);
-        take(&mut self.mean_curvature_std, queries, &with.mean_curvature_std);
-        take(&mut self.k1_std, queries, &with.k1_std);
-        take(&mut self.k2_std, queries, &with.k2_std);
-        take(&mut self.fit_used, queries, &with.fit_used);
-        take(&mut self.count, queries, &with.count);
-        take(&mut self.status, queries, &with.status);
-        take(&mut self.linearity, queries, &with.linearity);
-        take(&mut self.planarity, queries, &with.planarity);
-        take(&mut self.scattering, queries, &with.scattering);
-        take(&mut self.coefficients, queries, &with.coefficients);
+    /// Takes over values from another extraction: (number here, number there).
+    pub(super) fn take_over(&mut self, entries: impl Iterator<Item = (usize, usize)> + Clone, with: &Self) {
+        let take = Take(entries);
+        take.over(&mut self.radii, &with.radii);
+        take.over(&mut self.k1, &with.k1);
+        take.over(&mut self.k2, &with.k2);
+        take.over(&mut self.normals, &with.normals);
+        take.over(&mut self.directions, &with.directions);
+        take.over(&mut self.residual, &with.residual);
+        take.over(&mut self.condition, &with.condition);
+        take.over(&mut self.mean_curvature_std, &with.mean_curvature_std);
+        take.over(&mut self.k1_std, &with.k1_std);
+        take.over(&mut self.k2_std, &with.k2_std);
+        take.over(&mut self.fit_used, &with.fit_used);
+        take.over(&mut self.count, &with.count);
+        take.over(&mut self.status, &with.status);
+        take.over(&mut self.linearity, &with.linearity);
+        take.over(&mut self.planarity, &with.planarity);
+        take.over(&mut self.scattering, &with.scattering);
+        take.over(&mut self.coefficients, &with.coefficients);
     }
 
     /// The fitted paraboloid of a query in patch units (lengths divided by the patch's side, twice
@@ -135,6 +130,21 @@ impl Extraction {
         match self.axes {
             FitAxes::Surface => Paraboloid::of_principal_curvatures(self.k1[index], self.k2[index], side),
             FitAxes::Sensor => Paraboloid::of_coefficients(self.coefficients[index], side),
+        }
+    }
+}
+
+/// Which entries go where.
+struct Take<I>(I);
+
+impl<I: Iterator<Item = (usize, usize)> + Clone> Take<I> {
+    /// A column that is not there on either side stays as it is.
+    fn over<T: Copy>(&self, column: &mut [T], with: &[T]) {
+        if column.is_empty() || with.is_empty() {
+            return;
+        }
+        for (here, there) in self.0.clone() {
+            column[here] = with[there];
         }
     }
 }

@@ -1,28 +1,34 @@
 //! From points to curvature: the only loop over points.
 
+mod auto_radius;
 mod columns;
+mod explained;
 mod extraction;
 mod monitor;
 mod neighborhood;
 mod queries;
+mod radii;
 mod region;
 mod robust;
 mod shares;
 mod status;
 mod worker;
 
+pub use auto_radius::extract_auto_radius;
 pub use extraction::Extraction;
 pub use monitor::Monitor;
 pub use neighborhood::Neighborhood;
 pub use queries::{Queries, voxel_representatives};
+pub use radii::extract_radii;
 pub use status::Status;
 
 use crate::cell_index::CellIndex;
 use crate::fit::{FitAxes, FitKind};
+use crate::hierarchy::{DENSE, DENSE_FOR_SEVERAL};
 use crate::simd::InstructionSet;
 use crate::threads::with_threads;
 use crate::{Error, PointCloud, Radius};
-use columns::Columns;
+use columns::{Columns, ColumnsPart};
 use neighborhood::first_radius;
 use rayon::prelude::*;
 use shares::{Share, shares};
@@ -54,6 +60,13 @@ pub struct ExtractOptions<'a> {
     pub threads: Option<usize>,
     /// Instructions to use; the best there are where it is `None`. The result is the same, bit for bit.
     pub instruction_set: Option<InstructionSet>,
+}
+
+impl ExtractOptions<'_> {
+    /// The directions of some of the queries.
+    fn directions_of(&self, chosen: &[usize]) -> Option<Vec<[f32; 3]>> {
+        self.directions.map(|all| chosen.iter().map(|&i| all[i]).collect())
+    }
 }
 
 /// Curvature at every point of a cloud, from the points within a radius or another [`Neighborhood`].
@@ -106,6 +119,18 @@ pub fn extract_monitored(
 ) -> Result<Extraction, Error> {
     let neighborhood = neighborhood.into();
     neighborhood.check()?;
+    check(cloud, queries, options)?;
+    with_threads(options.threads, || match neighborhood {
+        Neighborhood::Ball(radius) | Neighborhood::Hybrid { radius, .. } => {
+            let found = run(cloud, &Balls::one(radius), neighborhood, queries, options, monitor)?;
+            Ok(found.of_balls.into_iter().next().expect("one ball was asked for"))
+        }
+        Neighborhood::Nearest(k) => run_nearest(cloud, k, queries, options, monitor),
+    })?
+}
+
+/// What the options and the queries ask for together.
+fn check(cloud: &PointCloud<'_>, queries: &Queries<'_>, options: &ExtractOptions<'_>) -> Result<(), Error> {
     if options.fit != FitKind::Paraboloid && options.axes == FitAxes::Sensor {
         return Err(Error::QuadricInSensorAxes);
     }
@@ -113,12 +138,7 @@ pub fn extract_monitored(
     if let Some(directions) = options.directions.map(<[_]>::len).filter(|&n| n != queries.len(cloud)) {
         return Err(Error::DirectionsMismatch { directions, queries: queries.len(cloud) });
     }
-    with_threads(options.threads, || match neighborhood {
-        Neighborhood::Ball(radius) | Neighborhood::Hybrid { radius, .. } => {
-            Ok(run(cloud, radius, neighborhood, queries, options, monitor)?.0)
-        }
-        Neighborhood::Nearest(k) => run_nearest(cloud, k, queries, options, monitor),
-    })?
+    Ok(())
 }
 
 /// Balls that grow until each holds its k nearest points.
@@ -130,19 +150,20 @@ fn run_nearest(
     monitor: &Monitor,
 ) -> Result<Extraction, Error> {
     let mut radius = first_radius(cloud, k, monitor)?;
-    let (mut found, index) = run(cloud, radius, Neighborhood::Nearest(k), queries, options, monitor)?;
+    let nearest = Neighborhood::Nearest(k);
+    let Found { mut of_balls, index, .. } =
+        run(cloud, &Balls::one(radius), nearest, queries, options, monitor)?;
+    let mut found = of_balls.swap_remove(0);
     let mut left = unresolved(&found, k, &index);
     while !left.is_empty() {
         // The count of what is done starts again for those that need more.
         monitor.take_back(left.len());
         radius = Radius::new(2.0 * radius.get())?;
-        let some = queries.some(&left);
-        let directions: Option<Vec<[f32; 3]>> =
-            options.directions.map(|all| left.iter().map(|&i| all[i]).collect());
-        let options = ExtractOptions { directions: directions.as_deref(), ..options.clone() };
-        let (more, index) = run(cloud, radius, Neighborhood::Nearest(k), &some.queries(), &options, monitor)?;
-        found.replace(&left, &more);
-        let still = unresolved(&more, k, &index);
+        let Found { of_balls, index, .. } =
+            run_some(cloud, &Balls::one(radius), nearest, queries, &left, options, monitor)?;
+        found.radius = radius.get();
+        found.take_over(left.iter().copied().zip(0..), &of_balls[0]);
+        let still = unresolved(&of_balls[0], k, &index);
         left = still.into_iter().map(|i| left[i]).collect();
     }
     Ok(found)
@@ -155,33 +176,94 @@ fn unresolved(found: &Extraction, k: usize, index: &CellIndex) -> Vec<usize> {
     (0..found.len()).filter(short).collect()
 }
 
+/// As [`run`], for some of the queries.
+fn run_some(
+    cloud: &PointCloud<'_>,
+    balls: &Balls<'_>,
+    neighborhood: Neighborhood,
+    queries: &Queries<'_>,
+    chosen: &[usize],
+    options: &ExtractOptions<'_>,
+    monitor: &Monitor,
+) -> Result<Found, Error> {
+    let some = queries.some(chosen);
+    let directions = options.directions_of(chosen);
+    let options = ExtractOptions { directions: directions.as_deref(), ..options.clone() };
+    run(cloud, balls, neighborhood, &some.queries(), &options, monitor)
+}
+
+/// Some balls around each query.
+struct Balls<'a> {
+    /// Radius of the largest, and of the lattice.
+    largest: Radius,
+    /// Radii in units of the largest, it being the first.
+    radii: &'a [f64],
+}
+
+impl Balls<'_> {
+    fn one(radius: Radius) -> Self {
+        Self { largest: radius, radii: &[1.0] }
+    }
+}
+
+/// What one walk over the queries gives.
+struct Found {
+    /// Of each ball.
+    of_balls: Vec<Extraction>,
+    index: CellIndex,
+    /// The queries in dense places, where several balls are not walked at once.
+    left: Vec<usize>,
+}
+
 fn run(
     cloud: &PointCloud<'_>,
-    radius: Radius,
+    balls: &Balls<'_>,
     neighborhood: Neighborhood,
     queries: &Queries<'_>,
     options: &ExtractOptions<'_>,
     monitor: &Monitor,
-) -> Result<(Extraction, CellIndex), Error> {
-    let index = CellIndex::of_positions(cloud.len(), |i| cloud.position(i), radius, monitor)?;
-    let elsewhere = queries.index(cloud, radius, monitor)?;
+) -> Result<Found, Error> {
+    let index = CellIndex::of_positions(cloud.len(), |i| cloud.position(i), balls.largest, monitor)?;
+    let elsewhere = queries.index(cloud, balls.largest, monitor)?;
     let asked = elsewhere.as_ref().unwrap_or(&index);
     let own_radii = !matches!(neighborhood, Neighborhood::Ball(_));
-    let mut columns = Columns::new(asked.len(), radius.get(), own_radii, options);
     let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
-    let hierarchy = matches!(neighborhood, Neighborhood::Ball(_)) && !options.robust;
-    let shares = shares(&index, asked, hierarchy);
-    let parts = columns.parts(shares.iter().map(Share::len));
+    let dense = (matches!(neighborhood, Neighborhood::Ball(_)) && !options.robust)
+        .then_some(if balls.radii.len() > 1 { DENSE_FOR_SEVERAL } else { DENSE });
+    let mut shares = shares(&index, asked, dense);
+    let mut left = Vec::new();
+    if balls.radii.len() > 1 {
+        let dense = shares.extract_if(.., |share| matches!(share, Share::Region { .. }));
+        left = dense.flat_map(|share| share.ranks().collect::<Vec<_>>()).collect();
+        left.iter_mut().for_each(|rank| *rank = asked.point_of_rank[*rank] as usize);
+        left.sort_unstable();
+    }
+    let lengths: Vec<usize> = shares.iter().map(Share::len).collect();
+    let entries = lengths.iter().sum();
+    let mut columns: Vec<Columns> = balls
+        .radii
+        .iter()
+        .map(|radius| Columns::new(entries, radius * balls.largest.get(), own_radii, options))
+        .collect();
+    let mut parts: Vec<Vec<ColumnsPart<'_>>> = lengths.iter().map(|_| Vec::new()).collect();
+    for columns in &mut columns {
+        for (parts, part) in parts.iter_mut().zip(columns.parts(lengths.iter().copied())) {
+            parts.push(part);
+        }
+    }
     // One by one, since some are large.
     shares.iter().zip(parts).par_bridge().try_for_each_init(
-        || Worker::new(&index, asked, neighborhood, options, set),
-        |worker, (share, mut part)| match share {
-            Share::Direct(runs) => worker.extract(runs, &mut part, monitor),
-            Share::Region { corner, cells } => worker.extract_region(*corner, cells, &mut part, monitor),
+        || Worker::new(&index, asked, neighborhood, balls.radii, options, set),
+        |worker, (share, mut parts)| match share {
+            Share::Direct(runs) => worker.extract(runs, &mut parts, monitor),
+            Share::Region { corner, cells } => worker.extract_region(*corner, cells, &mut parts, monitor),
         },
     )?;
     let oriented = options.viewpoint.is_some() || options.directions.is_some();
-    let query_of_entry = shares.iter().flat_map(Share::ranks).map(|rank| asked.point_of_rank[rank]);
-    let found = columns.finish(queries.len(cloud), query_of_entry, options.axes, oriented);
-    Ok((found, index))
+    let finish = |columns: Columns| {
+        let query_of_entry = shares.iter().flat_map(Share::ranks).map(|rank| asked.point_of_rank[rank]);
+        columns.finish(queries.len(cloud), query_of_entry, options.axes, oriented)
+    };
+    let of_balls = columns.into_iter().map(finish).collect();
+    Ok(Found { of_balls, index, left })
 }

@@ -1,6 +1,7 @@
 //! How a caller watches an extraction, and stops it.
 
 use crate::Error;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 
 /// Shared with a running extraction: how far it is, and whether it should stop.
@@ -17,7 +18,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 #[derive(Debug, Default)]
 pub struct Monitor {
     done: AtomicUsize,
-    cancelled: AtomicBool,
+    cancelled: Arc<AtomicBool>,
 }
 
 impl Monitor {
@@ -29,6 +30,11 @@ impl Monitor {
     /// Asks the extraction to stop; it returns [`crate::Error::Cancelled`] soon after.
     pub fn cancel(&self) {
         self.cancelled.store(true, Relaxed);
+    }
+
+    /// One for work that is stopped with this, and counted apart.
+    pub(crate) fn apart(&self) -> Self {
+        Self { done: AtomicUsize::new(0), cancelled: Arc::clone(&self.cancelled) }
     }
 
     /// An error where the caller asked to stop.

@@ -54,6 +54,19 @@ impl Neighborhood {
 /// A radius that holds k points around three quarters of the points, estimated at a few of them; later
 /// passes double it for those that need more.
 pub(super) fn first_radius(cloud: &PointCloud<'_>, k: usize, monitor: &Monitor) -> Result<Radius, Error> {
+    let (distances, largest) = distances_to_nearest(cloud, k, monitor)?;
+    let most = distances.get(3 * distances.len() / 4).copied().unwrap_or(1.0);
+    let found = distances.into_iter().find(|&d| d >= most && d > 0.0).unwrap_or(1.0);
+    // Not below what float64 can number at these coordinates.
+    Radius::new((1.05 * found).clamp(1e-12 * largest.max(1e-6), 1e17))
+}
+
+/// Distances to the k-th nearest point, the smallest first, at a few of the points; and the largest coordinate.
+pub(super) fn distances_to_nearest(
+    cloud: &PointCloud<'_>,
+    k: usize,
+    monitor: &Monitor,
+) -> Result<(Vec<f64>, f64), Error> {
     let positions: Vec<[f64; 3]> = (0..cloud.len()).filter_map(|i| cloud.position(i)).collect();
     let largest = positions.iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
     let step = positions.len().div_ceil(SAMPLES).max(1);
@@ -69,8 +82,5 @@ pub(super) fn first_radius(cloud: &PointCloud<'_>, k: usize, monitor: &Monitor) 
         })
         .collect::<Result<Vec<f64>, Error>>()?;
     distances.sort_unstable_by(f64::total_cmp);
-    let most = distances.get(3 * distances.len() / 4).copied().unwrap_or(1.0);
-    let found = distances.into_iter().find(|&d| d >= most && d > 0.0).unwrap_or(1.0);
-    // Not below what float64 can number at these coordinates.
-    Radius::new((1.05 * found).clamp(1e-12 * largest.max(1e-6), 1e17))
+    Ok((distances, largest))
 }

@@ -9,12 +9,12 @@ use crate::cell_index::CellIndex;
 use crate::simd::lanes::LANES;
 
 impl Worker<'_> {
-    /// Fills a part of the columns with the queries of these cells, one after the other.
+    /// Fills a part of the columns with the queries of these cells, one after the other; of one ball around each.
     pub(super) fn extract_region(
         &mut self,
         corner: [i64; 3],
         cells: &[DenseCell],
-        part: &mut ColumnsPart<'_>,
+        parts: &mut [ColumnsPart<'_>],
         monitor: &Monitor,
     ) -> Result<(), Error> {
         let CellIndex { x, y, z, .. } = self.asked;
@@ -36,20 +36,21 @@ impl Worker<'_> {
                         query: self.asked.point_of_rank[rank],
                         radius: 1.0,
                     });
-                    self.moments.push(if self.exact() {
+                    let moments = if self.exact() {
                         self.hierarchical.moments::<f64>(patch, offset(rank))
                     } else {
                         self.hierarchical.moments::<f32>(patch, offset(rank))
-                    });
+                    };
+                    self.moments[0].push(moments);
                     if self.pending.len() == LANES {
-                        self.fit_pending(part);
+                        self.fit_pending(parts);
                     }
                 }
                 monitor.add(queries.len());
             }
             first += ranks.len();
         }
-        self.fit_pending(part);
+        self.fit_pending(parts);
         Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! The queries cut into shares, each for one thread at a time.
 
 use crate::cell_index::{CELLS_PER_ROW, CellIndex, Row, RowKey};
-use crate::hierarchy::{CELLS_PER_REGION, DENSE};
+use crate::hierarchy::CELLS_PER_REGION;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
@@ -42,12 +42,13 @@ impl Share {
     }
 }
 
-/// All queries in shares, the largest first; `hierarchy` says whether dense cells go to it.
-pub(super) fn shares(index: &CellIndex, asked: &CellIndex, hierarchy: bool) -> Vec<Share> {
-    let dense: Vec<DenseCell> = if hierarchy {
-        asked.rows.par_iter().flat_map_iter(|row| dense_cells(index, asked, row)).collect()
-    } else {
-        Vec::new()
+/// All queries in shares, the largest first. Cells of the lattice with so many points or more go to the hierarchy.
+pub(super) fn shares(index: &CellIndex, asked: &CellIndex, dense: Option<usize>) -> Vec<Share> {
+    let dense: Vec<DenseCell> = match dense {
+        Some(dense) => {
+            asked.rows.par_iter().flat_map_iter(|row| dense_cells(index, asked, row, dense)).collect()
+        }
+        None => Vec::new(),
     };
     let mut direct = Vec::new();
     let mut chunk = Chunk { runs: Vec::new(), room: CHUNK };
@@ -77,7 +78,7 @@ pub(super) fn shares(index: &CellIndex, asked: &CellIndex, hierarchy: bool) -> V
 
 /// The dense cells of a row in which there are queries. What is dense follows from a cell's own points: a tile
 /// decides as the whole cloud does, and for some queries as for all.
-fn dense_cells(index: &CellIndex, asked: &CellIndex, row: &Row) -> Vec<DenseCell> {
+fn dense_cells(index: &CellIndex, asked: &CellIndex, row: &Row, dense: usize) -> Vec<DenseCell> {
     let lattice = &index.lattice;
     let mut cells = Vec::new();
     let Some(points) = index.row(row.key) else { return cells };
@@ -90,7 +91,7 @@ fn dense_cells(index: &CellIndex, asked: &CellIndex, row: &Row) -> Vec<DenseCell
         let ranks = query..after(&asked.x, query, row.end, cell);
         point = after(&index.x, point, points.end, cell - 1);
         let end = after(&index.x, point, points.end, cell);
-        if end - point >= DENSE {
+        if end - point >= dense {
             cells.push(DenseCell { key: row.key, cell, ranks: ranks.clone() });
         }
         (query, point) = (ranks.end, end);

@@ -9,12 +9,13 @@ use crate::cell_index::{CellIndex, Row, RowKey};
 use crate::fit::FitKind;
 use crate::fit::paraboloid::{Paraboloids, Task, fit_paraboloids};
 use crate::fit::quadric::fit_quadrics;
-use crate::fit::tensor::{MomentBatch, Vector};
+use crate::fit::tensor::{Axes, MomentBatch, Vector};
 use crate::hierarchy::HierarchicalWalk;
 use crate::members::Members;
 use crate::moments::{Moments, Scalar};
+use crate::shells::Shells;
 use crate::simd::InstructionSet;
-use crate::simd::lanes::{LANES, Lanes};
+use crate::simd::lanes::{LANES, Lanes, Mask};
 use std::ops::Range;
 
 /// Most queries that share their windows.
@@ -29,7 +30,10 @@ pub(super) struct Worker<'a> {
     options: &'a ExtractOptions<'a>,
     set: InstructionSet,
     pub pending: Vec<Pending>,
-    pub moments: Vec<Moments<f64>>,
+    /// Of each ball around the pending queries, the largest first: the moments of each query.
+    pub moments: Vec<Vec<Moments<f64>>>,
+    /// What tells several balls around a query apart, where there are several.
+    shells: Option<Shells>,
     /// Of each pending query, where its points are looked at more than once.
     members: Vec<Members>,
     distances: Distances,
@@ -46,30 +50,40 @@ pub(super) struct Pending {
     pub entry: usize,
     /// Its number among the queries.
     pub query: u32,
-    /// Radius of its neighbourhood, in units of the lattice's.
+    /// Radius of its neighbourhood, in units of the ball's.
     pub radius: f64,
 }
 
 impl<'a> Worker<'a> {
+    /// For balls of these radii around each query, in units of the lattice's: 1, or 1 and smaller ones.
     pub fn new(
         index: &'a CellIndex,
         asked: &'a CellIndex,
         neighborhood: Neighborhood,
+        radii: &[f64],
         options: &'a ExtractOptions<'a>,
         set: InstructionSet,
     ) -> Self {
-        let (walk, hierarchical) = (DirectWalk::new(index, set), HierarchicalWalk::new(index, set));
-        let (pending, moments) = (Vec::with_capacity(LANES), Vec::with_capacity(LANES));
-        let members = (0..LANES).map(|_| Members::new()).collect();
-        let distances = Distances::default();
-        Self { walk, hierarchical, asked, neighborhood, options, set, pending, moments, members, distances }
+        Self {
+            walk: DirectWalk::new(index, set),
+            hierarchical: HierarchicalWalk::new(index, set),
+            asked,
+            neighborhood,
+            options,
+            set,
+            pending: Vec::with_capacity(LANES),
+            moments: radii.iter().map(|_| Vec::with_capacity(LANES)).collect(),
+            shells: (radii.len() > 1).then(|| Shells::new(set, radii)),
+            members: (0..LANES).map(|_| Members::new()).collect(),
+            distances: Distances::default(),
+        }
     }
 
-    /// Fills a part of the columns with the queries of these runs of ranks, one after the other.
+    /// Fills a part of each ball's columns with the queries of these runs of ranks, one after the other.
     pub fn extract(
         &mut self,
         runs: &[Range<usize>],
-        part: &mut ColumnsPart<'_>,
+        parts: &mut [ColumnsPart<'_>],
         monitor: &Monitor,
     ) -> Result<(), Error> {
         let rows = &self.asked.rows;
@@ -83,15 +97,15 @@ impl<'a> Worker<'a> {
                 let end = end.min(ranks.end);
                 while rank < end {
                     monitor.check()?;
-                    let next = self.extract_run(key, rank..end, entry, part);
+                    let next = self.extract_run(key, rank..end, entry, parts);
                     entry += next - rank;
                     rank = next;
                 }
                 row += 1;
             }
         }
-        self.fit_pending(part);
-        monitor.add(part.len());
+        self.fit_pending(parts);
+        monitor.add(parts.iter().map(|part| part.len()).sum());
         Ok(())
     }
 
@@ -102,7 +116,7 @@ impl<'a> Worker<'a> {
         key: RowKey,
         ranks: Range<usize>,
         entry: usize,
-        part: &mut ColumnsPart<'_>,
+        parts: &mut [ColumnsPart<'_>],
     ) -> usize {
         let CellIndex { x, y, z, lattice, .. } = self.asked;
         let start = ranks.start;
@@ -120,16 +134,15 @@ impl<'a> Worker<'a> {
         for rank in run.clone() {
             let offset = [x[rank], y[rank], z[rank]];
             let lane = self.pending.len();
-            let (moments, radius) = if self.exact() {
-                self.around::<f64>(offset, lane)
+            let radius = if self.exact() {
+                self.around::<f64>(offset, lane, |_| true)
             } else {
-                self.around::<f32>(offset, lane)
+                self.around::<f32>(offset, lane, |_| true)
             };
             let query = self.asked.point_of_rank[rank];
             let entry = entry + rank - start;
             self.pending.push(Pending { key, offset, patch: None, entry, query, radius });
-            self.moments.push(moments);
-            if self.pending.len() == LANES && self.fit_pending(part) {
+            if self.pending.len() == LANES && self.fit_pending(parts) {
                 // The walk went back to points of the batch.
                 self.walk.enter_row(key);
                 self.walk.enter_run(low, high);
@@ -143,11 +156,21 @@ impl<'a> Worker<'a> {
         self.options.fit != FitKind::Paraboloid
     }
 
-    /// The moments around a query in units of its neighbourhood's radius, and that radius in units of the
-    /// lattice's.
-    fn around<S: Scalar>(&mut self, offset: [f32; 3], lane: usize) -> (Moments<f64>, f64) {
+    /// Takes the moments around a query as those of a lane, in units of its neighbourhood's radius; returns that
+    /// radius in units of the ball's. Of several balls, those that are `wanted`.
+    fn around<S: Scalar>(&mut self, offset: [f32; 3], lane: usize, wanted: impl Fn(usize) -> bool) -> f64 {
+        if let Some(shells) = &mut self.shells {
+            let all = shells.moments::<S>(&mut self.walk, offset);
+            for (ball, moments) in all.iter().enumerate().filter(|(ball, _)| wanted(*ball)) {
+                place(&mut self.moments[ball], lane, *moments);
+            }
+            return 1.0;
+        }
         let (most, radius_of_fewer) = match self.neighborhood {
-            Neighborhood::Ball(_) if !self.options.robust => return (self.walk.moments::<S>(offset), 1.0),
+            Neighborhood::Ball(_) if !self.options.robust => {
+                place(&mut self.moments[0], lane, self.walk.moments::<S>(offset));
+                return 1.0;
+            }
             Neighborhood::Ball(_) => (usize::MAX, Some(1.0)),
             Neighborhood::Nearest(k) => (k, None),
             Neighborhood::Hybrid { most, .. } => (most, Some(1.0)),
@@ -155,46 +178,70 @@ impl<'a> Worker<'a> {
         let members = &mut self.members[lane];
         members.take(&mut self.walk, offset);
         let radius = members.keep_nearest(most, radius_of_fewer);
-        (members.moments::<S>(self.set, |_| true), radius)
+        place(&mut self.moments[0], lane, members.moments::<S>(self.set, |_| true));
+        radius
     }
 
     /// Fits and writes the pending queries; says whether the walk has moved for it.
-    pub fn fit_pending(&mut self, part: &mut ColumnsPart<'_>) -> bool {
+    pub fn fit_pending(&mut self, parts: &mut [ColumnsPart<'_>]) -> bool {
         if self.pending.is_empty() {
             return false;
         }
-        let mut fits = self.fit(fit_paraboloids);
-        let weak = |lane: &usize| !self.exact() && fits.needs_f64.get(*lane);
-        let again: Vec<usize> = (0..self.pending.len()).filter(weak).collect();
-        for &lane in &again {
+        let mut fits: Vec<Paraboloids> = Vec::with_capacity(parts.len());
+        let mut starts = Vec::with_capacity(parts.len());
+        for ball in 0..parts.len() {
+            // A smaller ball's normal is near to that of the next larger one.
+            starts.push(fits.last().map(Paraboloids::start));
+            fits.push(self.fit(fit_paraboloids, ball, starts[ball]));
+        }
+        let moved = !self.exact() && self.sum_again(&mut fits, &starts);
+        if self.options.robust {
+            let all = fits.into_iter().map(|fits| self.fit_without_outliers(fits)).collect();
+            fits = all;
+        }
+        for (ball, (fits, part)) in fits.iter().zip(parts).enumerate() {
+            let quadrics = self.exact().then(|| self.fit(fit_quadrics, ball, None));
+            for (lane, (query, moments)) in self.pending.iter().zip(&self.moments[ball]).enumerate() {
+                let quadric = quadrics.as_ref().filter(|quadrics| match self.options.fit {
+                    FitKind::Auto => quadrics.preferred.get(lane),
+                    _ => quadrics.trusted.get(lane),
+                });
+                let fit = Fit { paraboloid: fits, quadric, lane };
+                part.write(query.entry, moments.sums[0], query.radius, &fit);
+            }
+        }
+        self.pending.clear();
+        self.moments.iter_mut().for_each(Vec::clear);
+        moved
+    }
+
+    /// Takes the sums again in `f64` where those in `f32` do not carry the fits, and fits again; says whether the
+    /// walk has moved for it.
+    fn sum_again(&mut self, fits: &mut [Paraboloids], starts: &[Option<(Axes, Mask)>]) -> bool {
+        let mut moved = false;
+        for lane in 0..self.pending.len() {
+            let weak = |ball: usize| fits[ball].needs_f64.get(lane);
+            if !(0..fits.len()).any(weak) {
+                continue;
+            }
             let Pending { key, offset, patch, .. } = self.pending[lane];
-            self.moments[lane] = match patch {
-                Some(patch) => self.hierarchical.moments::<f64>(patch, offset),
+            match patch {
+                Some(patch) => self.moments[0][lane] = self.hierarchical.moments::<f64>(patch, offset),
                 None => {
                     self.walk.enter_row(key);
                     self.walk.enter_run(offset, offset);
-                    self.around::<f64>(offset, lane).0
+                    self.around::<f64>(offset, lane, weak);
                 }
-            };
+            }
+            moved = true;
         }
-        if !again.is_empty() {
-            fits = self.fit(fit_paraboloids);
+        for (ball, fits) in fits.iter_mut().enumerate() {
+            if (0..self.pending.len()).any(|lane| fits.needs_f64.get(lane)) {
+                // From where it began before, so that the batch's other lanes find what they had.
+                *fits = self.fit(fit_paraboloids, ball, starts[ball]);
+            }
         }
-        if self.options.robust {
-            fits = self.fit_without_outliers(fits);
-        }
-        let quadrics = self.exact().then(|| self.fit(fit_quadrics));
-        for (lane, (query, moments)) in self.pending.iter().zip(&self.moments).enumerate() {
-            let quadric = quadrics.as_ref().filter(|quadrics| match self.options.fit {
-                FitKind::Auto => quadrics.preferred.get(lane),
-                _ => quadrics.trusted.get(lane),
-            });
-            let fit = Fit { paraboloid: &fits, quadric, lane };
-            part.write(query.entry, moments.sums[0], query.radius, &fit);
-        }
-        self.pending.clear();
-        self.moments.clear();
-        !again.is_empty()
+        moved
     }
 
     /// Fits again, without the points that are far from the fits, until the choice of points stands.
@@ -204,23 +251,23 @@ impl<'a> Worker<'a> {
             for lane in 0..self.pending.len() {
                 let (members, distances) = (&mut self.members[lane], &mut self.distances);
                 let moments = without_outliers(members, &fits, lane, self.set, distances);
-                if let Some(moments) = moments.filter(|moments| *moments != self.moments[lane]) {
-                    self.moments[lane] = moments;
+                if let Some(moments) = moments.filter(|moments| *moments != self.moments[0][lane]) {
+                    self.moments[0][lane] = moments;
                     changed = true;
                 }
             }
             if !changed {
                 break;
             }
-            fits = self.fit(fit_paraboloids);
+            fits = self.fit(fit_paraboloids, 0, None);
         }
         fits
     }
 
-    /// Fits one kind of surface to all pending queries.
-    fn fit<T>(&self, fit: fn(InstructionSet, &Task<'_>) -> T) -> T {
-        let moments = &MomentBatch::new(&self.moments);
-        fit(self.set, &Task { moments, axes: self.options.axes, to_sensor: self.to_sensor() })
+    /// Fits one kind of surface to one of the balls around all pending queries.
+    fn fit<T>(&self, fit: fn(InstructionSet, &Task<'_>) -> T, ball: usize, start: Option<(Axes, Mask)>) -> T {
+        let moments = &MomentBatch::new(&self.moments[ball]);
+        fit(self.set, &Task { moments, axes: self.options.axes, to_sensor: self.to_sensor(), start })
     }
 
     /// From each pending query to the side from which it was seen, where somebody knows.
@@ -238,5 +285,14 @@ impl<'a> Worker<'a> {
             }
             (None, None) => None,
         }
+    }
+}
+
+/// Puts a lane's moments where they belong, the next place or one that is taken.
+fn place(moments: &mut Vec<Moments<f64>>, lane: usize, of_lane: Moments<f64>) {
+    if lane == moments.len() {
+        moments.push(of_lane);
+    } else {
+        moments[lane] = of_lane;
     }
 }

@@ -59,7 +59,7 @@ pub struct SurfacePoint {
 pub fn fit_quadric(moments: &Moments<f64>) -> Option<Quadric> {
     let (placement, local) = Placement::of(moments, UNKNOWNS)?;
     let batch = MomentBatch::new(&[local]);
-    let task = Task { moments: &batch, axes: FitAxes::Surface, to_sensor: None };
+    let task = Task { moments: &batch, axes: FitAxes::Surface, to_sensor: None, start: None };
     let fits = fit_quadrics(InstructionSet::detect(), &task);
     let fitted = fits.coefficients.map(|c| c.0[0]);
     if !fits.settled.get(0) || !fitted.iter().all(|c| c.is_finite()) {

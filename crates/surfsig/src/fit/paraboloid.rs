@@ -32,6 +32,9 @@ const FLAT: f64 = 1e-6;
 /// Turns of the axes after which a patch has `not_converged`.
 const MAX_TURNS: usize = 25;
 
+/// Axes are a start where their normal is near to the points' own: a cosine.
+const NEAR: f64 = 0.99;
+
 /// Points whose second spread is below this share of the first lie on a line (variances): a strip 30
 /// times as long as wide, such as a single line of a lidar. Across it, float32 offsets alone would make
 /// curvatures of a thousandth of the inverse radius, and noise any curvature.
@@ -64,6 +67,8 @@ pub(crate) struct Task<'a> {
     pub axes: FitAxes,
     /// From each point towards the sensor; `None` where nobody knows.
     pub to_sensor: Option<Vector>,
+    /// Axes that are nearly the surface's own, and for which points.
+    pub start: Option<(Axes, Mask)>,
 }
 
 /// The fits of a batch, lengths in units of the radius.
@@ -115,7 +120,11 @@ fn fit(task: &Task<'_>) -> Paraboloids {
             (axes, solution, Mask::ALL, singular)
         }
         FitAxes::Surface => {
-            let start = Axes { u: longest, v: cross(&normal, &longest), w: normal };
+            let mut start = Axes { u: longest, v: cross(&normal, &longest), w: normal };
+            if let Some((axes, known)) = &task.start {
+                let near = Lanes::splat(NEAR).lt(dot(&axes.w, &normal).abs());
+                start = axes.chosen(*known & near, &start);
+            }
             turn_until_flat(task.moments, start, !(no_plane | too_few))
         }
     };
@@ -158,6 +167,13 @@ fn fit(task: &Task<'_>) -> Paraboloids {
         singular,
         converged,
         needs_f64: !(too_few | rough & wide & regular & blunt),
+    }
+}
+
+impl Paraboloids {
+    /// Where to begin with another ball around the same points: these axes, where they are the surface's own.
+    pub fn start(&self) -> (Axes, Mask) {
+        (self.axes, self.converged & !(self.no_plane | self.too_few | self.singular))
     }
 }
 
@@ -214,11 +230,7 @@ pub(super) fn turn_until_flat(
         let w = add_scaled(&add_scaled(&axes.w, -damping * c, &axes.u), -damping * d, &axes.v);
         let turned = axes.tilted_to(&w);
         // A lane that has converged keeps its axes, and so finds the same solution again.
-        axes = Axes {
-            u: chosen(active, &turned.u, &axes.u),
-            v: chosen(active, &turned.v, &axes.v),
-            w: chosen(active, &turned.w, &axes.w),
-        };
+        axes = turned.chosen(active, &axes);
         solution = solve(&moments.along(&axes));
         let [_, _, c_new, d_new, _, _] = solution.coefficients;
         let (gain_c, gain_d) = (c - c_new, d - d_new);

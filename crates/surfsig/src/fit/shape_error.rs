@@ -32,20 +32,27 @@ pub(crate) fn shape_covariance(
     let by_unknowns =
         [[cc + cc, cs + cs, ss + ss], [-(cs + cs), cc - ss, cs + cs], [ss + ss, -(cs + cs), cc + cc]];
     let [ea, ba, be] = factor.lower;
-    let solved = by_unknowns.map(|[a, e, b]| {
-        let e = (-ea).mul_add(a, e);
-        [a, e, (-be).mul_add(e, (-ba).mul_add(a, b))]
-    });
+    let mut solved = by_unknowns;
+    for [a, e, b] in &mut solved {
+        *e = (-ea).mul_add(*a, *e);
+        *b = (-be).mul_add(*e, (-ba).mul_add(*a, *b));
+    }
     // Unbiased: of the points' freedom, six have gone into the unknowns.
     let freedom = count - Lanes::splat(UNKNOWNS as f64);
     let some = Lanes::ZERO.lt(freedom);
     let variance = some.select(residual_square.max(Lanes::ZERO) / freedom, Lanes::splat(f64::NAN));
-    let [da, de, db] = factor.inverse_pivot;
-    let between = |p: usize, q: usize| {
-        let ([pa, pe, pb], [qa, qe, qb]) = (solved[p], solved[q]);
-        variance * (pa * qa).mul_add(da, (pe * qe).mul_add(de, pb * qb * db))
-    };
-    [between(0, 0), between(0, 1), between(0, 2), between(1, 1), between(1, 2), between(2, 2)]
+    // By loops and functions: closures would be compiled without the wide instructions.
+    const TRIANGLE: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+    let mut covariance = [Lanes::ZERO; 6];
+    for (entry, (p, q)) in covariance.iter_mut().zip(TRIANGLE) {
+        *entry = variance * weighted_product(&solved[p], &solved[q], &factor.inverse_pivot);
+    }
+    covariance
+}
+
+#[inline(always)]
+fn weighted_product(p: &Vector, q: &Vector, weights: &Vector) -> Lanes {
+    (p[0] * q[0]).mul_add(weights[0], (p[1] * q[1]).mul_add(weights[1], p[2] * q[2] * weights[2]))
 }
 
 #[cfg(test)]

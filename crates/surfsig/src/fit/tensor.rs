@@ -56,6 +56,16 @@ impl Axes {
         Self { u: [one, zero, zero], v: [zero, one, zero], w: [zero, zero, one] }
     }
 
+    /// These axes where `mask` is set, and the others elsewhere.
+    #[inline(always)]
+    pub fn chosen(&self, mask: Mask, others: &Self) -> Self {
+        Self {
+            u: chosen(mask, &self.u, &others.u),
+            v: chosen(mask, &self.v, &others.v),
+            w: chosen(mask, &self.w, &others.w),
+        }
+    }
+
     /// With `w` along a new direction and `u` turned as little as possible.
     #[inline(always)]
     pub fn tilted_to(&self, w: &Vector) -> Self {
@@ -176,12 +186,19 @@ impl MomentBatch {
 /// or z moves it a row down.
 #[inline(always)]
 fn contract<const IN: usize, const OUT: usize>(tensor: &[Lanes; IN], a: &Vector) -> [Lanes; OUT] {
-    const ROW: [usize; 10] = [0, 1, 1, 2, 2, 2, 3, 3, 3, 3];
     let mut taken = [Lanes::ZERO; OUT];
-    for place in 0..OUT {
-        let below = place + ROW[place] + 1;
-        taken[place] = tensor[below + 1].mul_add(a[2], tensor[below].mul_add(a[1], tensor[place] * a[0]));
+    // Written out: of a loop the compiler makes vectors across places, with a gather for each operand.
+    macro_rules! take {
+        ($($place:literal in row $row:literal),*) => {
+            $(if $place < OUT {
+                let below = $place + $row + 1;
+                let y = tensor[below].mul_add(a[1], tensor[$place] * a[0]);
+                taken[$place] = tensor[below + 1].mul_add(a[2], y);
+            })*
+        };
     }
+    take!(0 in row 0, 1 in row 1, 2 in row 1, 3 in row 2, 4 in row 2, 5 in row 2);
+    take!(6 in row 3, 7 in row 3, 8 in row 3, 9 in row 3);
     taken
 }
 

@@ -165,10 +165,11 @@ impl<S: Scalar> Moments<S> {
     /// assert_eq!(m.get(1, 1, 1), 8.0 * 6.0);
     /// ```
     pub fn scaled(&self, factor: f64) -> Self {
+        let square = factor * factor;
+        let powers = [1.0, factor, square, square * factor, square * square];
         let mut scaled = *self;
-        for (sum, exponents) in scaled.sums.iter_mut().zip(EXPONENTS) {
-            let order: u8 = exponents.iter().sum();
-            *sum = S::from_f64(sum.to_f64() * factor.powi(order.into()));
+        for (sum, [i, j, k]) in scaled.sums.iter_mut().zip(EXPONENTS) {
+            *sum = S::from_f64(sum.to_f64() * powers[usize::from(i + j + k)]);
         }
         scaled
     }

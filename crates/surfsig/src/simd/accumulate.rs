@@ -7,15 +7,15 @@ use crate::moments::{MOMENTS, Scalar, slot};
 /// Lanes that the points are dealt to, one after the other, on every instruction set.
 const VIRTUAL_LANES: usize = 16;
 
-const HALF: usize = VIRTUAL_LANES / 2;
+const QUARTER: usize = VIRTUAL_LANES / 4;
 
-/// What the virtual lanes have summed, each with the one that is eight further.
-type LaneSums<S> = [[S; HALF]; MOMENTS];
+/// What the virtual lanes have summed, a quarter of them after the other: quarters add up side by side.
+type LaneSums<S> = [[[S; QUARTER]; MOMENTS]; VIRTUAL_LANES / QUARTER];
 
 /// The sums over the first `len` points of the block. The slots beyond `len`, up to a multiple of 16,
 /// must be zero: they then add nothing.
 pub(crate) fn accumulate<S: Scalar>(set: InstructionSet, block: &Block, len: usize) -> [S; MOMENTS] {
-    let mut lanes = [[S::default(); HALF]; MOMENTS];
+    let mut lanes = [[[S::default(); QUARTER]; MOMENTS]; VIRTUAL_LANES / QUARTER];
     sum_lanes(set, block, len, &mut lanes);
     let mut sums = reduce_lanes(set, &lanes);
     sums[0] = S::from_f64(len as f64);
@@ -101,8 +101,8 @@ fn accumulate_lanes<S: Scalar, const WIDTH: usize>(block: &Block, len: usize, la
     pass::<S, WIDTH, 8>(block, len, lanes, &HEIGHT_SQUARE, |x, y, z| {
         let (zz, xz, yz) = (mul(z, z), mul(x, z), mul(y, z));
         [
-            (x, Some(zz)),
-            (y, Some(zz)),
+            (zz, Some(x)),
+            (zz, Some(y)),
             (xz, Some(yz)),
             (yz, Some(yz)),
             (zz, Some(z)),
@@ -186,11 +186,10 @@ fn pass<S: Scalar, const WIDTH: usize, const TERMS: usize>(
             }
         }
         for (total, &slot) in totals.iter().zip(slots) {
-            let lanes = &mut lanes[slot];
-            for l in 0..WIDTH {
-                // The first to come to a place sets it, the second adds.
-                let place = (first + l) % HALF;
-                lanes[place] = if first + l < HALF { total[l] } else { lanes[place] + total[l] };
+            for (l, piece) in
+                (first..).step_by(QUARTER.min(WIDTH)).zip(total.chunks_exact(QUARTER.min(WIDTH)))
+            {
+                lanes[l / QUARTER][slot][l % QUARTER..][..piece.len()].copy_from_slice(piece);
             }
         }
     }
@@ -218,12 +217,15 @@ fn mul<S: Scalar, const WIDTH: usize>(a: [S; WIDTH], b: [S; WIDTH]) -> [S; WIDTH
 /// Sums each row's lanes in a fixed order, the same tree on every instruction set.
 #[inline(always)]
 fn reduce<S: Scalar>(lanes: &LaneSums<S>) -> [S; MOMENTS] {
-    let mut sums = [S::default(); MOMENTS];
-    for (sum, lanes) in sums.iter_mut().zip(lanes) {
-        let mut quarter = [S::default(); HALF / 2];
-        for l in 0..HALF / 2 {
-            quarter[l] = lanes[l] + lanes[l + HALF / 2];
+    let [first, second, third, fourth] = lanes;
+    let mut quarters = [[S::default(); QUARTER]; MOMENTS];
+    for (slot, quarter) in quarters.iter_mut().enumerate() {
+        for (l, sum) in quarter.iter_mut().enumerate() {
+            *sum = (first[slot][l] + third[slot][l]) + (second[slot][l] + fourth[slot][l]);
         }
+    }
+    let mut sums = [S::default(); MOMENTS];
+    for (sum, quarter) in sums.iter_mut().zip(&quarters) {
         *sum = (quarter[0] + quarter[2]) + (quarter[1] + quarter[3]);
     }
     sums

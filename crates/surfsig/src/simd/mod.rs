@@ -4,6 +4,7 @@
 pub(crate) mod accumulate;
 pub(crate) mod instruction_set;
 pub(crate) mod lanes;
+pub(crate) mod partition;
 pub(crate) mod select;
 pub(crate) mod split;
 

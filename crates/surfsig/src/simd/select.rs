@@ -48,6 +48,23 @@ impl Block {
         self.rank.copy_within(rest, 0);
         self.len -= BLOCK;
     }
+
+    /// Zeros from the last point to the end of its vector.
+    pub fn pad(&mut self) {
+        let padding = self.len..self.len.next_multiple_of(PADDING);
+        self.x[padding.clone()].fill(0.0);
+        self.y[padding.clone()].fill(0.0);
+        self.z[padding].fill(0.0);
+    }
+
+    /// Takes over the places of another's first `len` points.
+    pub fn append(&mut self, other: &Self, len: usize) {
+        let to = self.len..self.len + len;
+        self.x[to.clone()].copy_from_slice(&other.x[..len]);
+        self.y[to.clone()].copy_from_slice(&other.y[..len]);
+        self.z[to].copy_from_slice(&other.z[..len]);
+        self.len += len;
+    }
 }
 
 /// The coordinates of all points in rows, each array readable for [`PADDING`] slots beyond the last.

@@ -13,7 +13,7 @@ use proptest::prelude::*;
 
 fn fit_batch(moments: &[Moments<f64>], to_sensor: Vector3<f64>) -> Quadrics {
     let to_sensor = Some([to_sensor.x, to_sensor.y, to_sensor.z].map(Lanes::splat));
-    let task = Task { moments: &MomentBatch::new(moments), axes: FitAxes::Surface, to_sensor };
+    let task = Task { moments: &MomentBatch::new(moments), axes: FitAxes::Surface, to_sensor, start: None };
     fit_quadrics(InstructionSet::detect(), &task)
 }
 
@@ -123,7 +123,8 @@ fn a_lane_knows_nothing_of_its_neighbours() {
     for set in InstructionSet::available() {
         let batch = MomentBatch::new(&moments);
         let to_sensor = Some([Lanes::ZERO, Lanes::ZERO, Lanes::ONE]);
-        let fits = fit_quadrics(set, &Task { moments: &batch, axes: FitAxes::Surface, to_sensor });
+        let fits =
+            fit_quadrics(set, &Task { moments: &batch, axes: FitAxes::Surface, to_sensor, start: None });
         assert!((0..LANES).all(|lane| bits(&fits, lane) == bits(&together, lane)), "{}", set.name());
     }
     assert!(!together.converged.get(0) && !together.converged.get(4));
@@ -156,7 +157,7 @@ fn study(shape: Shape, count: usize, from: f64, noise: f64, batches: usize) -> S
             std::array::from_fn(|_| Moments::of_points(&shape.points(count, from, noise, &mut draws)));
         let to_sensor = Some([Lanes::ZERO, Lanes::ZERO, Lanes::ONE]);
         let batch = MomentBatch::new(&moments);
-        let task = Task { moments: &batch, axes: FitAxes::Surface, to_sensor };
+        let task = Task { moments: &batch, axes: FitAxes::Surface, to_sensor, start: None };
         let fits = fit_quadrics(InstructionSet::detect(), &task);
         let rival = fit_paraboloids(InstructionSet::detect(), &task).principal;
         for lane in 0..LANES {
@@ -273,7 +274,7 @@ fn cost_per_point() {
             std::array::from_fn(|_| Moments::of_points(&shape.points(235, -1.0, noise, &mut draws)));
         let batch = MomentBatch::new(&moments);
         for set in InstructionSet::available().into_iter().skip(1) {
-            let task = Task { moments: &batch, axes: FitAxes::Surface, to_sensor: None };
+            let task = Task { moments: &batch, axes: FitAxes::Surface, to_sensor: None, start: None };
             let times = [true, false].map(|quadric| {
                 let start = std::time::Instant::now();
                 for _ in 0..20_000 {
