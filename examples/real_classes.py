@@ -1,14 +1,16 @@
-"""Compare planes, cylinders and spheres of real scans: the paper's three classes, with and without a flat atom.
+"""Compare planes, cylinders and spheres of real scans, with and without a flat atom.
 
     python examples/real_classes.py FOLDER_OF_SCANS [PICTURE.png]
 
-The scans are not part of the project; their sources are named in BENCHMARKS.md.
+The scans are not part of the project; docs/zeta.md names their sources and what comes out.
 """
 
 from __future__ import annotations
 
+import functools
 import itertools
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +21,8 @@ from numpy.typing import NDArray
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.patches import Patch
 
 import surfsig
 
@@ -31,7 +35,7 @@ PURE = 0.9
 """Share of a ball's points that lie on the surface, at least."""
 
 THRESHOLD = 0.9
-"""The paper's optimal similarity."""
+"""The paper's optimal similarity; from 0.5 on it is good."""
 
 Array = NDArray[np.float64]
 Found = tuple[NDArray[np.bool_], Array]
@@ -120,6 +124,9 @@ SCENES = {
 }
 """The surfaces of each scan, and radii of balls: at the last one all scans are drawn and compared."""
 
+CLASSES = {"dissimilar, zeta below 0.5": "#d9d9d9", "good": "#9ecae1", "optimal, from 0.9 on": "#08519c"}
+"""The paper's, and their colours."""
+
 WAYS = ("no flat atom", "by standard errors", "by flat places")
 
 
@@ -133,15 +140,25 @@ class Sample:
     """Of a plane, at other places: they tell by how much noise bends it."""
 
 
+@functools.cache
+def points_of(file: Path) -> Array:
+    """Read a scan's points, without those that are missing."""
+    with warnings.catch_warnings():
+        # The gym ball's last line.
+        warnings.filterwarnings("ignore", ".*is cut off")
+        cloud = surfsig.read(file)
+    return cloud.points[cloud.finite].astype(np.float64)
+
+
 def sample(surface: Surface, radius: float, folder: Path) -> Sample:
     """Extract where hardly anything but the surface is in the ball, and the fit is in order."""
-    cloud = surfsig.read(folder / surface.file)
-    points = cloud.points[cloud.finite].astype(np.float64)
+    points = points_of(folder / surface.file)
     member, outward = surface.find(points)
 
     def pure(place: int) -> bool:
-        near = np.sum((points - points[place]) ** 2, axis=1) < radius**2
-        return bool(member[near].mean() >= PURE)
+        slab = np.abs(points[:, 0] - points[place, 0]) < radius
+        near = np.sum((points[slab] - points[place]) ** 2, axis=1) < radius**2
+        return bool(member[slab][near].mean() >= PURE)
 
     shuffled = np.random.default_rng(SEED).permutation(np.flatnonzero(member))
     at = np.array(list(itertools.islice(filter(pure, shuffled), 4 * PLACES)))
@@ -189,22 +206,26 @@ def table(title: str, radius: str, samples: list[Sample]) -> Iterator[str]:
 
 
 def draw(scenes: dict[str, list[Sample]], picture: Path) -> None:
-    """Draw zeta of all places with all, a row of panels for each scan."""
-    figure, axes = plt.subplots(len(scenes), len(WAYS), figsize=(11, 10.5), layout="constrained")
+    """Draw the similarity of all places with all, a row of panels for each scan."""
+    colours = ListedColormap(list(CLASSES.values()))
+    figure, axes = plt.subplots(len(scenes), len(WAYS), figsize=(9, 9.8), layout="constrained")
     for row, (title, samples) in zip(axes, scenes.items(), strict=True):
         ends = np.cumsum([0] + [len(s.found) for s in samples])
         middles = 0.5 * (ends[1:] + ends[:-1])
         for ax, way, zeta in zip(row, WAYS, similarities(samples), strict=True):
-            image = ax.imshow(zeta, vmin=0, vmax=1, cmap="viridis", interpolation="nearest")
+            ax.imshow(
+                zeta, cmap=colours, norm=BoundaryNorm([0, 0.5, THRESHOLD, 1], 3), interpolation="nearest"
+            )
             for end in ends[1:-1]:
-                ax.axhline(end - 0.5, color="white", linewidth=0.8)
-                ax.axvline(end - 0.5, color="white", linewidth=0.8)
+                ax.axhline(end - 0.5, color="black", linewidth=0.8)
+                ax.axvline(end - 0.5, color="black", linewidth=0.8)
             ax.set_xticks(middles, [s.kind for s in samples])
             ax.set_yticks(middles, [s.kind for s in samples], rotation=90, va="center")
             ax.tick_params(length=0)
             ax.set_title(f"{title}\n{way}", fontsize=10)
-    figure.colorbar(image, ax=axes, shrink=0.4, label="zeta")
-    figure.savefig(picture, dpi=100)
+    legend = [Patch(facecolor=colour, label=label) for label, colour in CLASSES.items()]
+    figure.legend(handles=legend, loc="outside lower center", ncols=3)
+    figure.savefig(picture, dpi=90)
 
 
 def main(folder: Path, picture: Path) -> None:
