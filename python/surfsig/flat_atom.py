@@ -84,7 +84,7 @@ def flat_atom_length(*extractions: Extraction, flat: bool = False, frame: Frame 
     noise = max(_noise_in_patch_units(extraction, flat) for extraction in extractions)
     frame = Frame.default() if frame is None else frame
     k = np.array([max(noise, ROUNDING)], np.float32)
-    # A paraboloid that is bent by noise: where H is small, its signature is linear in it and does not notice K.
+    # A paraboloid that is bent by noise: its signature is linear in a small H, and does not notice K.
     rows, _ = frame.signatures_of_curvatures(k, k, side=1.0)
     length = FLAT_ATOM_NOISES * float(np.linalg.norm(rows[0]))
     if not np.isfinite(length):
