@@ -43,10 +43,9 @@ def main(folder: Path) -> None:
         k1, k2 = np.median(s.k1[member]), np.median(s.k2[member])
         print(f"{name:34}{member.sum():8,}{_radius(k1):>12}{_radius(k2):>12}")
 
-    flat = surfsig.flat_atom_length(float(np.nanmedian(s.residual)), RADIUS, float(np.median(s.count)))
     names = simulate.part_scene().names
     reference = _middle_of(cloud, surface == _first(names, "sphere", "dome"))
-    zeta = s.similarity_to(s.signatures([reference], flat_atom=flat)[0])
+    zeta = s.similarity_to(s.signatures([reference], flat_atom="auto")[0])
     picture = folder / "part.png"
     _draw(s, zeta, reference, picture)
     cloud_file = folder / "part.ply"

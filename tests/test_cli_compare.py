@@ -32,7 +32,9 @@ def test_two_places_of_a_ball(shell: Callable[..., Any], ball: Path) -> None:
         assert values[name]["k1"] == pytest.approx(2, rel=0.02)
         assert values[name]["k2"] == pytest.approx(2, rel=0.02)
         assert values[name]["count"] > 20
-    signatures = surfsig.extract(read(ball), RADIUS, at=[[0, 0, 1.5], [0.1, -0.1, 1.5204]]).signatures()
+    found = [surfsig.extract(read(ball), RADIUS, at=[at]) for at in ([0, 0, 1.5], [0.1, -0.1, 1.5204])]
+    assert values["flat_atom"] == surfsig.flat_atom_length(*found)
+    signatures = [one.signatures([0], flat_atom=values["flat_atom"])[0] for one in found]
     assert values["zeta"] == pytest.approx(float(surfsig.similarity(*signatures)), abs=1e-6)
 
 
@@ -43,6 +45,16 @@ def test_a_ball_and_a_saddle(shell: Callable[..., Any], ball: Path, saddle: Path
     assert values["zeta"] < 0.5
     assert values["b"]["k1"] == pytest.approx(4, rel=0.02)
     assert values["b"]["k2"] == pytest.approx(-4, rel=0.02)
+
+
+def test_two_places_of_a_perfect_plane(shell: Callable[..., Any], tmp_path: Path) -> None:
+    x, y = (part.ravel() for part in np.meshgrid(*[np.linspace(-0.2, 0.2, 81)] * 2))
+    path = tmp_path / "plane.npz"
+    write(path, PointCloud(np.column_stack([x, y, np.ones_like(x)])))
+    at = ("--at", "0,0,1", "--at", "0.05,0,1")
+    values = json.loads(shell("compare", path, path, *at, "--radius", RADIUS, "--json").out)
+    assert values["class"] == "optimal"
+    assert values["zeta"] == pytest.approx(1, abs=1e-3)
 
 
 def test_for_a_person(shell: Callable[..., Any], ball: Path) -> None:

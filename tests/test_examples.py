@@ -85,6 +85,25 @@ def test_real_scans(shared_data: Path, tmp_path: Path) -> None:
     assert picture.stat().st_size > 50_000
 
 
+def test_real_classes(shared_data: Path, tmp_path: Path) -> None:
+    """The table of docs/zeta.md: right decisions, in percent, without a flat atom and with either length."""
+    pytest.importorskip("matplotlib")
+    picture = tmp_path / "classes.png"
+    lines = run(EXAMPLES / "real_classes.py", shared_data, picture)
+    rows = {tuple(cells[1:4]): cells[4:7] for line in lines[2:] if (cells := line.split(" | "))}
+    right = {key: [int(re.findall(r"\((\d+) %", cell)[0]) for cell in row] for key, row in rows.items()}
+    # A mug on a table, where neighbours err together: flat places tell by how much, standard errors do not.
+    assert right["0.03", "plane, plane", "4,950"] == pytest.approx([74, 28, 90], abs=3)
+    assert right["0.03", "plane, cylinder", "10,000"] == pytest.approx([100, 100, 95], abs=3)
+    assert right["0.03", "cylinder, cylinder", "4,950"] == pytest.approx([72, 73, 99], abs=3)
+    # With a ball of 10 mm the table's waves bend it as the mug is bent.
+    assert right["0.01", "plane, cylinder", "10,000"][2] == 0
+    # Where standard errors are right, they make the lidar's three scans of one sphere alike.
+    assert right["0.25", "sphere, sphere", "44,850"] == pytest.approx([75, 91, 100], abs=3)
+    assert right["0.25", "plane, sphere", "30,000"][1] >= 99
+    assert picture.stat().st_size > 50_000
+
+
 def test_every_example_has_a_test() -> None:
     here = Path(__file__).read_text(encoding="utf-8")
     # The tour has a file of its own.

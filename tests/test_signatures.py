@@ -138,8 +138,8 @@ def test_a_perfect_plane_has_no_direction_to_compare_but_for_a_flat_atom() -> No
     assert similarity(w, w) == pytest.approx(1)
 
 
-@pytest.mark.parametrize("flat_atom", [0, -0.1, np.nan, np.inf])
-def test_flat_atom_of_no_length(rough: Extraction, flat_atom: float) -> None:
+@pytest.mark.parametrize("flat_atom", [0, -0.1, np.nan, np.inf, "long"])
+def test_flat_atom_of_no_length(rough: Extraction, flat_atom: Any) -> None:
     with pytest.raises(InvalidInputError, match="flat_atom must be a finite number above 0"):
         rough.signatures([0], flat_atom=flat_atom)
 

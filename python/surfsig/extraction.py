@@ -16,6 +16,7 @@ from surfsig.arguments import (
 )
 from surfsig.defaults import SIGNATURE_BLOCK, Axes
 from surfsig.errors import InvalidInputError
+from surfsig.flat_atom import flat_atom_length
 from surfsig.point_cloud import PointCloud
 from surfsig.similarity import SIGNATURE, similarity
 
@@ -228,7 +229,7 @@ class Extraction:
         at: ArrayLike | None = ...,
         *,
         frame: Frame | None = ...,
-        flat_atom: float | None = ...,
+        flat_atom: float | Literal["auto"] | None = ...,
         return_status: Literal[False] = ...,
     ) -> FloatArray: ...
     @overload
@@ -237,7 +238,7 @@ class Extraction:
         at: ArrayLike | None = ...,
         *,
         frame: Frame | None = ...,
-        flat_atom: float | None = ...,
+        flat_atom: float | Literal["auto"] | None = ...,
         return_status: Literal[True],
     ) -> tuple[FloatArray, NDArray[np.uint8]]: ...
     def signatures(
@@ -245,7 +246,7 @@ class Extraction:
         at: ArrayLike | None = None,
         *,
         frame: Frame | None = None,
-        flat_atom: float | None = None,
+        flat_atom: float | Literal["auto"] | None = None,
         return_status: bool = False,
     ) -> FloatArray | tuple[FloatArray, NDArray[np.uint8]]:
         """Make signatures: the 242 numbers w, which have the lengths and dot products of eq. (2)'s c.
@@ -260,7 +261,8 @@ class Extraction:
         flat_atom
             Length of one more coordinate, the same for all, appended as the last column. A few times
             the length of a signature of pure noise, it tells "flat within its error" from "slightly
-            curved".
+            curved". "auto" takes `flat_atom_length` of this extraction, all its places; what is compared
+            with another extraction's signatures needs that of both.
         return_status
             Whether to return the places' statuses too, (k,) uint8, `Status.OUTSIDE_VOCABULARY` among
             them.
@@ -272,15 +274,15 @@ class Extraction:
         Raises
         ------
         InvalidInputError
-            If `at` is no set of places, or `flat_atom` is not a finite number above 0.
+            If `at` is no set of places, `flat_atom` is neither "auto" nor a finite number above 0, or as
+            `flat_atom_length`.
         """
         places = place_numbers(at, len(self))
         frame = Frame.default() if frame is None else frame
+        length = self._flat_atom(flat_atom, frame)
         rows, status = self._signatures(places, frame)
-        if flat_atom is not None:
-            if not (np.isfinite(flat_atom) and flat_atom > 0):
-                raise InvalidInputError(f"flat_atom must be a finite number above 0, not {flat_atom}")
-            flat = np.full((len(rows), 1), flat_atom, np.float32)
+        if length is not None:
+            flat = np.full((len(rows), 1), length, np.float32)
             flat[np.isnan(rows[:, 0])] = np.nan
             rows = np.hstack([rows, flat])
         if not return_status:
@@ -288,6 +290,15 @@ class Extraction:
         # The fit's own status says more, but for places that it left in order.
         fitted = self.status[places]
         return rows, np.where(status == Status.OK, fitted, status).astype(np.uint8)
+
+    def _flat_atom(self, flat_atom: float | Literal["auto"] | None, frame: Frame) -> float | None:
+        if flat_atom is None:
+            return None
+        if flat_atom == "auto":
+            return flat_atom_length(self, frame=frame)
+        if isinstance(flat_atom, str) or not (np.isfinite(flat_atom) and flat_atom > 0):
+            raise InvalidInputError(f'flat_atom must be a finite number above 0 or "auto", not {flat_atom!r}')
+        return flat_atom
 
     def _signatures(self, places: NDArray[np.int64], frame: Frame) -> tuple[FloatArray, NDArray[np.uint8]]:
         side, curvatures, surfaces = 1.0, (self.k1[places], self.k2[places]), self.coefficients
@@ -307,7 +318,11 @@ class Extraction:
         return frame.signatures_of_surfaces(surfaces, side=side)
 
     def iter_signatures(
-        self, *, frame: Frame | None = None, flat_atom: float | None = None, block: int = SIGNATURE_BLOCK
+        self,
+        *,
+        frame: Frame | None = None,
+        flat_atom: float | Literal["auto"] | None = None,
+        block: int = SIGNATURE_BLOCK,
     ) -> Iterator[tuple[slice, FloatArray, NDArray[np.uint8]]]:
         """Make the signatures of all places a block at a time, in order, for more than memory holds.
 
@@ -325,14 +340,16 @@ class Extraction:
         Raises
         ------
         InvalidInputError
-            If `block` is below 1, or `flat_atom` is not a finite number above 0.
+            If `block` is below 1, or as `signatures`.
         """
         if block < 1:
             raise InvalidInputError(f"block must be 1 or more, not {block}")
+        frame = Frame.default() if frame is None else frame
+        length = self._flat_atom(flat_atom, frame)
         for start in range(0, len(self), block):
             places = slice(start, min(start + block, len(self)))
             rows, status = self.signatures(
-                np.arange(places.start, places.stop), frame=frame, flat_atom=flat_atom, return_status=True
+                np.arange(places.start, places.stop), frame=frame, flat_atom=length, return_status=True
             )
             yield places, rows, status
 

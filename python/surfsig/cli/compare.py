@@ -12,7 +12,7 @@ from surfsig.cli.console import number, print_json, print_table
 from surfsig.cli.options import CLOUD, axes_option, input_options, json_option, position, threads_option
 
 if TYPE_CHECKING:
-    from surfsig import PointCloud
+    from surfsig import Extraction, PointCloud
     from surfsig.defaults import Axes
 
 
@@ -55,8 +55,9 @@ def compare_command(
     """Compare the surface at a position in A with the surface at a position in B (which may be A).
 
     Shows both places' curvatures and the similarity zeta of their signatures: from 0.9 "optimal", from 0.5
-    "good", below "dissimilar". Where nobody says from which side the surfaces were seen
-    (--viewpoint), zeta is the larger one of both sides.
+    "good", below "dissimilar". The signatures have a flat atom, as long as the places' noise asks for.
+    Where nobody says from which side the surfaces were seen (--viewpoint), zeta is the larger one of both
+    sides.
 
     \b
     Examples:
@@ -70,8 +71,7 @@ def compare_command(
     if len(at) != 2:
         raise click.UsageError("give --at twice: the position in A, then the one in B")
     places: list[dict[str, Any]] = []
-    signatures = []
-    oriented = True
+    found: list[Extraction] = []
     clouds: dict[Path, PointCloud] = {}
     for file, spot in zip((a, b), at, strict=True):
         if file not in clouds:
@@ -79,27 +79,27 @@ def compare_command(
         result = surfsig.extract(
             clouds[file], radius, axes=axes, at=[spot], viewpoint=viewpoint, threads=threads
         )
+        found.append(result)
         rows, statuses = result.signatures(return_status=True)
         status = surfsig.Status(int(statuses[0])).name.lower()
         if not np.isfinite(rows).all():
             where = ",".join(number(value) for value in spot)
             why = f"{status.replace('_', ' ')} ({int(result.count[0])} points within {number(radius)})"
             raise surfsig.InvalidInputError(f"{file}: no signature at {where}: {why}")
-        signatures.append(rows[0])
-        oriented = oriented and result.oriented
         place: dict[str, Any] = {"file": str(file), "at": spot, "status": status}
         place |= {"count": int(result.count[0])}
         place |= {name: float(getattr(result, name)[0]) for name in ("k1", "k2", "residual")}
         places.append(place)
-    either_side = not oriented and axes == "surface"
-    zeta = float(surfsig.similarity(signatures[0], signatures[1], either_side=either_side))
-    values = {"a": places[0], "b": places[1], "radius": radius, "axes": axes, "zeta": zeta}
-    # A perfect plane's signature is zero and has no direction to compare.
-    values["class"] = surfsig.similarity_class(zeta) if np.isfinite(zeta) else None
+    flat = surfsig.flat_atom_length(*found)
+    rows = np.vstack([result.signatures(flat_atom=flat) for result in found])
+    either_side = axes == "surface" and not all(result.oriented for result in found)
+    zeta = float(surfsig.similarity(rows[0], rows[1], either_side=either_side))
+    values = {"a": places[0], "b": places[1], "radius": radius, "axes": axes, "flat_atom": flat}
+    values |= {"zeta": zeta, "class": surfsig.similarity_class(zeta)}
     if as_json:
         print_json(values)
         return
-    table = [("zeta", f"{number(zeta)} ({values['class'] or 'a perfect plane has no direction to compare'})")]
+    table = [("zeta", f"{number(zeta)} ({values['class']})")]
     for name, place in zip("AB", places, strict=True):
         table.append((name, f"{place['file']} at {', '.join(number(value) for value in place['at'])}"))
         curvature = f"k1 {number(place['k1'])}, k2 {number(place['k2'])} per unit"

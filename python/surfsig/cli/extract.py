@@ -184,9 +184,7 @@ def _similarity_to(
 
     import surfsig
 
-    typical = result if len(result) > 1 else there
-    noise, count = np.nanmedian(typical.residual), np.median(typical.count)
-    flat = surfsig.flat_atom_length(float(noise), float(np.median(typical.radius)), float(count))
+    flat = surfsig.flat_atom_length(result if len(result) > 1 else there)
     signature, status = there.signatures(flat_atom=flat, return_status=True)
     if np.isnan(signature).any():
         why = surfsig.Status(int(status[0])).name.lower().replace("_", " ")
