@@ -66,8 +66,9 @@ def measure_setting(
     """Fit draws of one surface with all methods; the size is radius of curvature, ball and noise."""
     radius, ball, noise = size
     patches = draw_patches(surface, radius, ball, noise, (draws, POINTS), SEED)
-    found = {fit: surfsig_curvatures(patches, ball, fit) for fit in FITS}
-    answers: dict[str, tuple[Array, float]] = dict(found)
+    answers: dict[str, tuple[Array, float]] = {}
+    for fit in FITS:
+        answers[fit] = surfsig_curvatures(patches, ball, fit)
     if program is not None:
         for degree in DEGREES:
             answers[f"jet{degree}"] = jet_curvatures(program, degree, patches, folder), 0.0
@@ -132,7 +133,7 @@ def write_csv(path: Path, errors: list[Error]) -> None:
 def main() -> None:
     """Measure, print, draw and write."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--draws", type=int, default=400, help="of each setting (default: 400)")
+    parser.add_argument("--draws", type=int, default=1000, help="of each setting (default: 1000)")
     parser.add_argument(
         "--write", action="store_true", help="update BENCHMARKS.md, docs/fits.md and its picture"
     )

@@ -9,18 +9,25 @@ import numpy as np
 from error_report import METHODS, Error
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import PercentFormatter
 
-# Of Okabe and Ito, which the colour-blind can tell apart.
+# The colour-blind can tell these apart.
 COLORS = {
     "paraboloid": "#0072B2",
-    "quadric": "#D55E00",
+    "quadric": "#CC3311",
     "auto": "#000000",
-    "jet2": "#56B4E9",
+    "jet2": "#E69F00",
     "jet4": "#009E73",
 }
 DRAWN = (("sphere", 29.15), ("cylinder", 29.15), ("torus", 29.15))
-LIMITS = (3e-4, 3.0)
+LIMITS = (7e-4, 1.0)
+TICKS = (4, 6, 8, 11, 14, 17, 20, 24)
+
+# Width, opacity and dashes of what lies on another line, and has its bias: auto takes one of two others, and
+# a jet of degree 2 is nearly a paraboloid.
+STYLES = {"auto": (6.0, 0.22, "-"), "jet2": (2.2, 1.0, ":")}
+
+# A bias above this share of the spread is three standard errors or more in 1000 draws.
+SIGNIFICANT = 0.1
 
 
 def draw_picture(path: Path, errors: Iterable[Error]) -> None:
@@ -46,21 +53,24 @@ def draw_picture(path: Path, errors: Iterable[Error]) -> None:
 
 
 def draw_panel(ax: Axes, errors: list[Error]) -> None:
-    """Draw each method's root mean square error, and its bias, which is dashed."""
+    """Draw each method's root mean square error, and its bias where the draws show one."""
     for method, label in METHODS.items():
         own = sorted((e for e in errors if e.method == method), key=lambda e: e.ball)
         if not own:
             continue
-        balls = [e.ball for e in own]
-        # What auto takes is one of two others: it is drawn beneath them, and wider.
-        wide = {"linewidth": 5, "alpha": 0.25, "zorder": 1} if method == "auto" else {"linewidth": 1.6}
-        ax.plot(balls, [e.rms for e in own], color=COLORS[method], label=label, **wide)
-        if method != "auto":
-            ax.plot(balls, np.abs([e.bias for e in own]), "--", color=COLORS[method], linewidth=0.9)
+        balls, color = [e.ball for e in own], COLORS[method]
+        width, opacity, dashes = STYLES.get(method, (1.6, 1.0, "-"))
+        rms = [e.rms for e in own]
+        ax.plot(balls, rms, dashes, color=color, linewidth=width, alpha=opacity, label=label)
+        if method not in STYLES:
+            bias = [abs(e.bias) if abs(e.bias) > SIGNIFICANT * e.spread else np.nan for e in own]
+            ax.plot(balls, bias, "--", color=color, linewidth=0.9, marker=".", markersize=4)
     ax.plot([], [], color="grey", label="rms error")
-    ax.plot([], [], "--", color="grey", linewidth=0.9, label="bias alone")
+    ax.plot(
+        [], [], "--", color="grey", linewidth=0.9, marker=".", markersize=4, label="bias, where significant"
+    )
     ax.set(xscale="log", yscale="log", ylim=LIMITS)
-    ax.set_xticks([4, 6, 8, 11, 14, 20], labels=["4", "6", "8", "11", "14", "20"])
+    ax.set_xticks(TICKS, labels=[f"{tick:g}" for tick in TICKS])
     ax.minorticks_off()
-    ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=None))
+    ax.yaxis.set_major_formatter(lambda value, _: f"{100 * value:g} %")
     ax.grid(alpha=0.3)

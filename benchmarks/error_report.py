@@ -111,19 +111,22 @@ def crossing_rows(errors: Iterable[Error]) -> list[Row]:
 def crossing(errors: Iterable[Error]) -> str:
     """Return the ball from which the quadric is taken and errs less, by root mean square, for good."""
     listed = list(errors)
-    rms = {name: [e.rms for e in listed if e.method == name] for name in ("paraboloid", "quadric")}
-    balls = np.array([e.ball for e in listed if e.method == "quadric"])
-    taken = np.array([e.quadrics for e in listed if e.method == "quadric"]) > 0.5
-    gains = np.log(np.array(rms["paraboloid"]) / np.array(rms["quadric"]))
+    plain = np.array([e.rms for e in listed if e.method == "paraboloid"])
+    quadrics = [e for e in listed if e.method == "quadric"]
+    balls = np.array([e.ball for e in quadrics])
+    taken = np.array([e.quadrics > 0.5 for e in quadrics])
+    gains = np.log(plain / [e.rms for e in quadrics])
     worse = np.flatnonzero(~(taken & (gains > 0)))
     if len(worse) == 0:
         return f"below {balls[0]:g}"
     last = worse[-1]
     if last == len(balls) - 1:
         return f"above {balls[-1]:g}"
-    ball = float(np.exp(np.interp(0, gains[last : last + 2], np.log(balls[last : last + 2]))))
+    ball = balls[last + 1]
+    if taken[last]:
+        ball = np.exp(np.interp(0, gains[last : last + 2], np.log(balls[last : last + 2])))
     sagitta = ball**2 / (2 * listed[0].radius)
-    return f"{ball:.0f} (sagitta {sagitta / listed[0].noise:.0f} noises)"
+    return f"{ball:.3g} (sagitta {sagitta / listed[0].noise:.0f} noises)"
 
 
 def notes(measured: Results, draws: int, points: int) -> list[str]:
