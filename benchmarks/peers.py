@@ -24,6 +24,9 @@ BUILD = ROOT / "build" / "benchmarks"
 TIME_LIMIT_SECONDS = 1800
 CGAL_LIBRARIES = ("-lgmp", "-lmpfr")
 
+# Folders that hold the headers of a package, where pkg-config does not say.
+HEADERS = {"pcl_features": ("pcl-*", "eigen3"), "eigen3": ("eigen3",)}
+
 Command = list[str | Path]
 
 
@@ -199,7 +202,7 @@ def include_flags(package: str) -> list[str]:
         if answer.returncode == 0:
             return answer.stdout.split()
     for prefix in (Path("/usr/include"), Path("/usr/local/include"), Path("/opt/homebrew/include")):
-        found = [*sorted(prefix.glob("pcl-*"))[-1:], *prefix.glob("eigen3")]
-        if any(path.name.startswith(package[:3]) for path in found):
-            return [f"-I{path}" for path in found]
+        found = [sorted(prefix.glob(folder)) for folder in HEADERS[package]]
+        if all(found):
+            return [f"-I{folders[-1]}" for folders in found]
     raise PeerUnavailable(f"no headers of {package} (Debian: apt-get install libpcl-dev libcgal-dev)")
