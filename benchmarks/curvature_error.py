@@ -61,11 +61,10 @@ def jet_curvatures(program: Command, degree: int, patches: Array, folder: Path) 
 
 
 def measure_setting(
-    surface: Surface, size: tuple[float, float, float], draws: int, program: Command | None, folder: Path
+    patches: Array, surface: Surface, size: tuple[float, float, float], program: Command | None, folder: Path
 ) -> list[Error]:
-    """Fit draws of one surface with all methods; the size is radius of curvature, ball and noise."""
+    """Fit patches of one surface with all methods; the size is radius of curvature, ball and noise."""
     radius, ball, noise = size
-    patches = draw_patches(surface, radius, ball, noise, (draws, POINTS), SEED)
     answers: dict[str, tuple[Array, float]] = {}
     for fit in FITS:
         answers[fit] = surfsig_curvatures(patches, ball, fit)
@@ -87,7 +86,7 @@ def measure_setting(
                 bias=float(relative.mean()) if len(relative) else np.nan,
                 spread=float(relative.std(ddof=1)) if len(relative) > 1 else np.nan,
                 rms=float(np.sqrt(np.mean(relative**2))) if len(relative) else np.nan,
-                valid=len(relative) / draws,
+                valid=len(relative) / len(patches),
                 quadrics=quadrics,
             )
         )
@@ -112,8 +111,10 @@ def measure(draws: int, console: Console) -> tuple[list[Error], dict[str, str]]:
     ]
     errors: list[Error] = []
     with tempfile.TemporaryDirectory() as name:
-        for surface, size in track(settings, "drawing and fitting", console=console, transient=True):
-            errors += measure_setting(surface, size, draws, program, Path(name))
+        shown = track(settings, "drawing and fitting", console=console, transient=True)
+        for number, (surface, size) in enumerate(shown):
+            patches = draw_patches(surface, *size, (draws, POINTS), (SEED, number))
+            errors += measure_setting(patches, surface, size, program, Path(name))
     return errors, versions
 
 

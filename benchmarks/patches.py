@@ -81,7 +81,7 @@ SURFACES = (
 
 
 def draw_patches(
-    surface: Surface, radius: float, ball: float, noise: float, shape: tuple[int, int], seed: int
+    surface: Surface, radius: float, ball: float, noise: float, shape: tuple[int, int], seed: tuple[int, int]
 ) -> Array:
     """Draw patches, (draws, points, 3), spread evenly over the surface, with noise along its normal.
 
