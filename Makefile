@@ -10,7 +10,7 @@ PREFIX ?= /usr/local
 # What the compiled module is made from; a change of any rebuilds it.
 SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help demo test lint format bench bench-reading fuzz docs tour wheel check-wheel header install-c clean build
+.PHONY: help demo test lint format bench bench-reading bench-error fuzz docs tour wheel check-wheel header install-c clean build
 .DEFAULT_GOAL := help
 
 help: ## Say what there is to make
@@ -43,6 +43,9 @@ bench: build ## Time surfsig and its peers in one run, and write BENCHMARKS.md
 
 bench-reading: build ## Time the reading of files, and write that table of BENCHMARKS.md
 	$(BIN)/python benchmarks/reading.py --write
+
+bench-error: build ## Measure the error of curvature beside CGAL's jets, and write BENCHMARKS.md and docs/fits.md
+	$(BIN)/python benchmarks/curvature_error.py --write
 
 fuzz: build ## Read damaged files of all formats: make fuzz COUNT=100000
 	$(BIN)/python fuzz/mutate.py --count $(COUNT)

@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import venv
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,10 @@ ROOT = HERE.parent
 ENVIRONMENT = ROOT / ".venv-peers"
 BUILD = ROOT / "build" / "benchmarks"
 TIME_LIMIT_SECONDS = 1800
+CGAL_LIBRARIES = ("-lgmp", "-lmpfr")
+
+# Folders that hold the headers of a package, where pkg-config does not say.
+HEADERS = {"pcl_features": ("pcl-*", "eigen3"), "eigen3": ("eigen3",)}
 
 Command = list[str | Path]
 
@@ -141,50 +146,63 @@ def python_program() -> Command:
 
 
 def cpp_program() -> Command:
-    """Return the command of the PCL and CGAL program, compiling it where it is older than its source.
+    """Return the command of the PCL and CGAL program, compiled where needed.
 
     Raises
     ------
     PeerUnavailable
         When the compiler or the headers are missing, or it does not compile.
     """
+    libraries = [f"-lpcl_{part}" for part in ("features", "search", "kdtree", "octree", "common")]
+    return compiled(HERE / "peers_pcl_cgal.cpp", include_flags("pcl_features"), [*libraries, *CGAL_LIBRARIES])
+
+
+def jets_program() -> Command:
+    """Return the command of the program that fits CGAL's jets to given patches, compiled where needed.
+
+    Raises
+    ------
+    PeerUnavailable
+        When the compiler or the headers are missing, or it does not compile.
+    """
+    return compiled(HERE / "jets_cgal.cpp", include_flags("eigen3"), CGAL_LIBRARIES)
+
+
+def compiled(source: Path, includes: Sequence[str], libraries: Sequence[str]) -> Command:
+    """Compile a C++ program where it is older than its source, and return its command.
+
+    Raises
+    ------
+    PeerUnavailable
+        When there is no compiler, or it does not compile.
+    """
     candidates = (os.environ.get("CXX", ""), "g++", "clang++")
     compiler = next(filter(None, map(shutil.which, candidates)), None)
     if compiler is None:
         raise PeerUnavailable("no C++ compiler")
-    source, program = HERE / "peers_pcl_cgal.cpp", BUILD / "peers_pcl_cgal"
+    program = BUILD / source.stem
     if program.exists() and program.stat().st_mtime > source.stat().st_mtime:
         return [program]
     BUILD.mkdir(parents=True, exist_ok=True)
     # Not -march=native: the packaged PCL is built without AVX, and Eigen would align its types differently.
-    command: Command = [
-        compiler,
-        "-O3",
-        "-DNDEBUG",
-        "-fopenmp",
-        "-std=c++17",
-        *include_flags(),
-        source,
-        "-o",
-        program,
-    ]
-    libraries = [f"-lpcl_{part}" for part in ("features", "search", "kdtree", "octree", "common")]
-    run = subprocess.run([*command, *libraries, "-lgmp", "-lmpfr"], capture_output=True, text=True)
+    options = ("-O3", "-DNDEBUG", "-fopenmp", "-std=c++17")
+    command: Command = [compiler, *options, *includes, source, "-o", program, *libraries]
+    run = subprocess.run(command, capture_output=True, text=True)
     if run.returncode:
         errors = [line for line in run.stderr.splitlines() if "error" in line]
         raise PeerUnavailable(errors[0] if errors else last_line(run.stderr))
     return [program]
 
 
-def include_flags() -> list[str]:
-    """Return where PCL's and Eigen's headers are: as pkg-config says, otherwise in the usual places."""
+def include_flags(package: str) -> list[str]:
+    """Return where a package's headers (and Eigen's) are: as pkg-config says, else in the usual places."""
     if shutil.which("pkg-config"):
-        query = ["pkg-config", "--cflags", "pcl_features"]
+        query = ["pkg-config", "--cflags", package]
         answer = subprocess.run(query, capture_output=True, text=True)
         if answer.returncode == 0:
             return answer.stdout.split()
     for prefix in (Path("/usr/include"), Path("/usr/local/include"), Path("/opt/homebrew/include")):
-        found = sorted(prefix.glob("pcl-*"))
-        if found:
-            return [f"-I{found[-1]}", f"-I{prefix / 'eigen3'}"]
-    raise PeerUnavailable("PCL's headers are not installed (Debian: apt-get install libpcl-dev libcgal-dev)")
+        found = [sorted(prefix.glob(folder)) for folder in HEADERS[package]]
+        if all(found):
+            return [f"-I{folders[-1]}" for folders in found]
+    raise PeerUnavailable(f"no headers of {package} (Debian: apt-get install libpcl-dev libcgal-dev)")
