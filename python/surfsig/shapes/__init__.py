@@ -1,0 +1,150 @@
+"""Shapes of objects by orthogonal distance: `fit_sphere`, `fit_cylinder`, `fit_plane`, and how sure they are."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from surfsig.arguments import positive_length
+from surfsig.errors import InvalidInputError
+from surfsig.point_cloud import PointCloud, position_array
+from surfsig.shapes.cylinder import Cylinder
+from surfsig.shapes.fitted import FittedShape, fitted_shape
+from surfsig.shapes.growth import grown
+from surfsig.shapes.orthogonal import frame_of, settled
+from surfsig.shapes.plane import Plane
+from surfsig.shapes.sphere import Sphere
+from surfsig.shapes.surface import Surface
+
+__all__ = ["FittedShape", "fit_cylinder", "fit_plane", "fit_sphere"]
+
+
+def fit_sphere(
+    cloud: PointCloud | ArrayLike,
+    *,
+    near: ArrayLike | None = None,
+    radius: float | None = None,
+    robust: bool = False,
+) -> FittedShape:
+    """Fit a sphere to points, or to the points of a scan that are on a sphere near a place.
+
+    The sum of squared distances from the surface is least. The standard errors hold for noise that is
+    correlated over up to a few hundredths of the surface, as scanners' is: they come from what the residuals
+    of 32 blocks of neighbouring points have in common (cluster-robust, unbiased for independent noise). What
+    one side of a scan errs against the other, such as a lidar's range over all of it, is not in them, nor is
+    the outward bias of noise, rms^2 / radius.
+
+    Parameters
+    ----------
+    cloud
+        What `PointCloud.of` takes. Points that are not finite do not count.
+    near
+        (3,), a place on the surface, in the cloud's coordinates. The fit begins with the points around it, and
+        grows to all points within 3 standard deviations of the surface that hang together.
+        Without it all points are fitted.
+    radius
+        With `near`: of the ball around it whose points are the start, in the cloud's unit; half the object's
+        own is a good one. By default as many of the nearest points as determine the shape.
+    robust
+        Whether to leave out points farther than 3 standard deviations from the surface, judged by the median,
+        and fit again until none is left; with `near` this is always done.
+
+    Returns
+    -------
+    FittedShape
+        With `radius`, its standard error `radius_std` and its 95 % `interval`.
+
+    Raises
+    ------
+    InvalidInputError
+        If the points are too few, or determine no sphere; or an argument has no meaning.
+    """
+    return _fit(Sphere, cloud, near, radius, robust)
+
+
+def fit_cylinder(
+    cloud: PointCloud | ArrayLike,
+    *,
+    near: ArrayLike | None = None,
+    radius: float | None = None,
+    robust: bool = False,
+) -> FittedShape:
+    """Fit a cylinder without ends to points, or to those of a scan that are on a cylinder near a place.
+
+    Parameters
+    ----------
+    cloud, near, radius, robust
+        As for `fit_sphere`.
+
+    Returns
+    -------
+    FittedShape
+        With `axis`, `radius`, its standard error `radius_std` and its 95 % `interval`.
+
+    Raises
+    ------
+    InvalidInputError
+        As `fit_sphere`.
+    """
+    return _fit(Cylinder, cloud, near, radius, robust)
+
+
+def fit_plane(
+    cloud: PointCloud | ArrayLike,
+    *,
+    near: ArrayLike | None = None,
+    radius: float | None = None,
+    robust: bool = False,
+) -> FittedShape:
+    """Fit a plane to points, or to those of a scan that are on a plane near a place.
+
+    Parameters
+    ----------
+    cloud, near, radius, robust
+        As for `fit_sphere`.
+
+    Returns
+    -------
+    FittedShape
+        With the normal as `axis`.
+
+    Raises
+    ------
+    InvalidInputError
+        As `fit_sphere`.
+    """
+    return _fit(Plane, cloud, near, radius, robust)
+
+
+def _fit(
+    kind: type[Surface],
+    data: PointCloud | ArrayLike,
+    place: ArrayLike | None,
+    radius: float | None,
+    robust: bool,
+) -> FittedShape:
+    cloud = PointCloud.of(data)
+    finite = cloud.finite
+    offsets = cloud.offsets[finite].astype(np.float64)
+    if len(offsets) <= kind.unknowns:
+        raise InvalidInputError(
+            f"a {kind.kind} takes at least {kind.unknowns + 1} points, not {len(offsets)}"
+        )
+    if radius is not None and place is None:
+        raise InvalidInputError("radius is that of the ball around near: give near, too")
+    # Near 0 and of an extent near 1 nothing is lost to rounding.
+    middle, unit = frame_of(offsets)
+    points = (offsets - middle) / unit
+    if place is None:
+        found = settled(kind, points, robust=robust)
+    else:
+        start = None if radius is None else positive_length(radius, "radius") / unit
+        spot = (position_array(place, "near") - cloud.origin - middle) / unit
+        found = grown(kind, points, spot, start)
+    if found is None:
+        where = "" if place is None else " near that place"
+        raise InvalidInputError(f"the points{where} determine no {kind.kind}")
+    surface, chosen = found
+    inliers = np.zeros(len(cloud), np.bool_)
+    inliers[np.flatnonzero(finite)[chosen]] = True
+    return fitted_shape(surface.placed(unit, middle), cloud, inliers)
