@@ -1,4 +1,4 @@
-"""Shapes of objects by orthogonal distance: `fit_sphere`, `fit_cylinder`, `fit_plane`, and how sure they are."""
+"""Shapes by orthogonal distance, and how sure they are: `fit_sphere`, `fit_cylinder`, `fit_plane`."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surfsig.arguments import positive_length
+from surfsig.clean import COORDINATE_LIMIT
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud, position_array
 from surfsig.shapes.cylinder import Cylinder
 from surfsig.shapes.fitted import FittedShape, fitted_shape
 from surfsig.shapes.growth import grown
-from surfsig.shapes.orthogonal import frame_of, settled
+from surfsig.shapes.orthogonal import determined, frame_of, settled
 from surfsig.shapes.plane import Plane
 from surfsig.shapes.sphere import Sphere
 from surfsig.shapes.surface import Surface
@@ -28,23 +29,24 @@ def fit_sphere(
 ) -> FittedShape:
     """Fit a sphere to points, or to the points of a scan that are on a sphere near a place.
 
-    The sum of squared distances from the surface is least. The standard errors hold for noise that is
-    correlated over up to a few hundredths of the surface, as scanners' is: they come from what the residuals
-    of 32 blocks of neighbouring points have in common (cluster-robust, unbiased for independent noise). What
-    one side of a scan errs against the other, such as a lidar's range over all of it, is not in them, nor is
-    the outward bias of noise, rms^2 / radius.
+    The sum of squared distances from the surface is least. The standard errors do not rely on the number of
+    points, which err alike where they are neighbours, but on what the residuals of 32 blocks of neighbouring
+    points have in common: right for independent noise, and for a scanner's that is correlated within
+    blocks. What a scanner errs over all of the surface is not in them (a lidar's rim, the outward bias
+    of noise of about rms^2 / radius).
 
     Parameters
     ----------
     cloud
         What `PointCloud.of` takes. Points that are not finite do not count.
     near
-        (3,), a place on the surface, in the cloud's coordinates. The fit begins with the points around it, and
-        grows to all points within 3 standard deviations of the surface that hang together.
+        (3,), a place on the surface or near it, in the cloud's coordinates. The fit begins with the points
+        around it, and grows to all points within 3 standard deviations of the surface that hang together.
         Without it all points are fitted.
     radius
         With `near`: of the ball around it whose points are the start, in the cloud's unit; half the object's
-        own is a good one. By default as many of the nearest points as determine the shape.
+        own to all of it is a good one. By default 32, 64, ... of the nearest points, until two starts lead
+        to the same shape.
     robust
         Whether to leave out points farther than 3 standard deviations from the surface, judged by the median,
         and fit again until none is left; with `near` this is always done.
@@ -130,6 +132,8 @@ def _fit(
         raise InvalidInputError(
             f"a {kind.kind} takes at least {kind.unknowns + 1} points, not {len(offsets)}"
         )
+    if not (np.abs(offsets) <= COORDINATE_LIMIT).all():
+        raise InvalidInputError(f"coordinates must be within {COORDINATE_LIMIT:g} for a fit")
     if radius is not None and place is None:
         raise InvalidInputError("radius is that of the ball around near: give near, too")
     # Near 0 and of an extent near 1 nothing is lost to rounding.
@@ -141,7 +145,7 @@ def _fit(
         start = None if radius is None else positive_length(radius, "radius") / unit
         spot = (position_array(place, "near") - cloud.origin - middle) / unit
         found = grown(kind, points, spot, start)
-    if found is None:
+    if found is None or not determined(found[0], points[found[1]]):
         where = "" if place is None else " near that place"
         raise InvalidInputError(f"the points{where} determine no {kind.kind}")
     surface, chosen = found

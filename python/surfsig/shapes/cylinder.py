@@ -59,7 +59,7 @@ class Cylinder(Surface):
         offsets = points - (self.center + step[0] * u + step[1] * v)
         along = offsets @ axis
         outward = offsets - np.outer(along, axis)
-        outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+        outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), np.finfo(float).tiny)
         shift = -np.column_stack([outward @ u, outward @ v])
         return np.column_stack([shift, shift * (along / length)[:, None], np.full(len(points), -1.0)])
 

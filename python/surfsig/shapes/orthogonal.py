@@ -19,6 +19,9 @@ ROUNDING = 1e-12
 MAX_PASSES = 50
 """Passes after which the choice of points is taken as it is; some ten are usual."""
 
+_SINGULAR = 1e-9
+"""A column of the Jacobian of which the others leave less than this part is a combination of theirs."""
+
 _TOLERANCE = 1e-12
 _MOST_EVALUATIONS = 500
 
@@ -76,8 +79,8 @@ def refined(start: Surface, points: Array) -> Surface | None:
 def settled(kind: type[Surface], points: Array, *, robust: bool) -> tuple[Surface, NDArray[np.bool_]] | None:
     """Fit a surface, and say which points count; `robust` leaves out those that are far from it.
 
-    What is far is judged by the median distance of all points, which outliers hardly move; points leave and come
-    back until the choice stands.
+    What is far is judged by the median distance of all points, which outliers hardly move; points leave and
+    come back until the choice stands.
     """
     surface = surface_through(kind, points)
     inliers = np.ones(len(points), np.bool_)
@@ -91,6 +94,13 @@ def settled(kind: type[Surface], points: Array, *, robust: bool) -> tuple[Surfac
         inliers = chosen
         surface = refined(surface, points[inliers])
     return None if surface is None else (surface, inliers)
+
+
+def determined(surface: Surface, points: Array) -> bool:
+    """Tell whether the points fix all unknowns of a surface; those of a circle fix no sphere."""
+    triangle = np.linalg.qr(surface.jacobian(points, np.zeros(surface.unknowns)))[1]
+    diagonal = np.abs(np.diag(triangle))
+    return bool(diagonal.min() > _SINGULAR * diagonal.max())
 
 
 def near(distances: Array, judges: Array) -> NDArray[np.bool_]:

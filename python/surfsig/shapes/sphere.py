@@ -47,7 +47,7 @@ class Sphere(Surface):
     def jacobian(self, points: Array, step: Array) -> Array:
         """Give minus the outward normals, and -1."""
         outward = points - (self.center + step[:3])
-        outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+        outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), np.finfo(float).tiny)
         return np.column_stack([-outward, np.full(len(points), -1.0)])
 
     def embedding(self) -> Array:

@@ -1,11 +1,11 @@
 """Covariance of a fit whose residuals are neither independent nor of one size.
 
 A scanner errs along its ray, and neighbouring points err alike: the number of points alone promises too
-much. The points are cut into blocks of neighbours, and only what whole blocks have in common counts as
-independent: the cluster-robust covariance J+ (sum of r r^T over blocks) J+^T, with the residuals of each block
-corrected for what the fit took away from them (Bell and McCaffrey 2002, "CR2"). It is unbiased for
-independent noise, and holds for any correlation that is short against the blocks. An interval takes the t
-distribution with the degrees of freedom that the blocks leave.
+much. The points are cut into blocks of neighbours, and only whole blocks count as independent: the
+cluster-robust covariance J+ (sum of r r^T over blocks) J+^T, with the residuals of each block corrected for
+what the fit took away from them (Bell and McCaffrey 2002, "CR2"). It is unbiased for independent noise of any
+size per point, and holds for a correlation that is short against the blocks. An interval takes Student's t
+with the degrees of freedom that the blocks leave.
 """
 
 from __future__ import annotations
