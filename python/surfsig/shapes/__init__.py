@@ -32,8 +32,8 @@ def fit_sphere(
     The sum of squared distances from the surface is least. The standard errors do not rely on the number of
     points, which err alike where they are neighbours, but on what the residuals of 32 blocks of neighbouring
     points have in common: right for independent noise, and for a scanner's that is correlated within
-    blocks. What a scanner errs over all of the surface is not in them (a lidar's rim, the outward bias
-    of noise of about rms^2 / radius).
+    blocks. What a scanner errs over all of the surface is not in them, nor which points were taken for
+    the surface's, nor the outward bias of noise, about rms^2 / radius.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ _SAME = 0.5
 _AGREEMENT = 2
 """Starts that must lead to the same shape for no further, larger ones to be tried."""
 
-_HOLDS = 0.9
+_HOLDS = 0.95
 """Part of a shape's points that must hang together; the rest may be strays."""
 
 _FINEST = 2.0**-20
