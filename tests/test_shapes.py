@@ -16,7 +16,7 @@ from surfsig.shapes.cylinder import Cylinder
 from surfsig.shapes.plane import Plane
 from surfsig.shapes.sphere import Sphere
 from surfsig.shapes.surface import Surface
-from surfsig.shapes.uncertainty import block_covariance, spatial_blocks
+from surfsig.shapes.uncertainty import block_count, block_covariance, spatial_blocks
 
 DRAWS = 300
 
@@ -164,6 +164,13 @@ def test_the_covariance_of_a_plane_is_calibrated() -> None:
     )
 
 
+def independent_error(points: Array, shape: surfsig.FittedShape) -> float:
+    """Give the standard error of a sphere's radius that points without correlation would have."""
+    normals = (points - shape.center) / np.linalg.norm(points - shape.center, axis=1)[:, None]
+    jacobian = np.column_stack([normals, np.ones(len(points))])
+    return shape.rms * math.sqrt(np.linalg.inv(jacobian.T @ jacobian)[3, 3])
+
+
 def test_points_that_err_alike_do_not_narrow_the_interval() -> None:
     """The points of a small patch have one error in common: their number says nothing, the blocks do."""
     rng = np.random.default_rng(7)
@@ -174,11 +181,7 @@ def test_points_that_err_alike_do_not_narrow_the_interval() -> None:
         points *= 1 + 0.01 * rng.normal(size=200)[patches, None]
         shape = fit_sphere(points)
         inside.append(shape.interval[0] <= 1 <= shape.interval[1])
-        # The standard error of independent points, of which there are 15 to a patch.
-        normals = (points - shape.center) / np.linalg.norm(points - shape.center, axis=1)[:, None]
-        jacobian = np.column_stack([normals, np.ones(len(points))])
-        deviation = shape.rms * math.sqrt(np.linalg.inv(jacobian.T @ jacobian)[3, 3])
-        naive.append(abs(shape.radius - 1) < 1.96 * deviation)
+        naive.append(abs(shape.radius - 1) < 1.96 * independent_error(points, shape))
     assert np.mean(naive) < 0.5
     assert 0.9 < np.mean(inside) < 0.99
 
@@ -194,6 +197,50 @@ def test_noise_along_the_ray_keeps_the_interval_honest() -> None:
     spread = np.std([shape.radius for shape in shapes])
     assert 0.9 < np.sqrt(np.mean([shape.radius_std**2 for shape in shapes])) / spread < 1.2
     assert np.mean([shape.interval[0] <= 1 <= shape.interval[1] for shape in shapes]) > 0.93
+
+
+def lidar(rng: np.random.Generator, distance: float) -> Array:
+    """Give a sphere of radius 0.3 as a lidar of 16 lines sees it, whose errors are alike along each line."""
+    azimuth = np.radians(np.arange(-10, 10, 0.2))
+    memory = math.exp(-1 / 20)
+    lines = []
+    for elevation in np.radians(np.arange(-15, 16, 2) + rng.uniform(-1, 1)):
+        rays = np.column_stack(
+            [
+                np.cos(azimuth) * math.cos(elevation),
+                np.sin(azimuth) * math.cos(elevation),
+                np.full(len(azimuth), math.sin(elevation)),
+            ]
+        )
+        along = rays[:, 0] * distance
+        hit = along**2 - distance**2 + 0.3**2
+        drift = [rng.normal()]
+        for _ in azimuth[1:]:
+            drift.append(memory * drift[-1] + math.sqrt(1 - memory**2) * rng.normal())
+        error = 0.007 * rng.normal(size=len(azimuth)) + 0.006 * np.array(drift)
+        ranges = along - np.sqrt(np.maximum(hit, 0)) + error
+        lines.append((rays * ranges[:, None])[hit > 0])
+    return np.concatenate(lines)
+
+
+def test_intervals_of_lidar_scans_hold_the_radius_far_more_often_than_naive_ones() -> None:
+    rng = np.random.default_rng(15)
+    inside, naive = [], []
+    for _ in range(DRAWS):
+        points = lidar(rng, rng.uniform(2.4, 3))
+        shape = fit_sphere(points, robust=True)
+        inside.append(shape.interval[0] <= 0.3 <= shape.interval[1])
+        naive.append(abs(shape.radius - 0.3) < 1.96 * independent_error(points[shape.inliers], shape))
+    assert np.mean(inside) > 0.8
+    assert np.mean(naive) < 0.7
+
+
+def test_there_are_fewer_blocks_where_neighbours_err_alike() -> None:
+    rng = np.random.default_rng(16)
+    points = sphere(rng, 0.0)
+    assert block_count(points, rng.normal(size=400)) == 32
+    assert block_count(points, rng.normal(size=50)[spatial_blocks(points, 50)]) < 12
+    assert block_count(points, np.zeros(400)) == 32
 
 
 def test_block_covariance_with_blocks_of_one_point_is_the_known_one() -> None:

@@ -12,7 +12,7 @@ from surfsig.defaults import INTERVAL
 from surfsig.point_cloud import PointCloud
 from surfsig.shapes.orthogonal import frame_of
 from surfsig.shapes.surface import Array, Kind, Surface
-from surfsig.shapes.uncertainty import block_covariance, spatial_blocks
+from surfsig.shapes.uncertainty import covariance_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,7 +58,7 @@ class FittedShape:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Of the radius: 95 % of such intervals hold the true one (Student's t); NaN for a plane."""
+        """The radius's 95 % interval by Student's t, as far as `surfsig.fit_sphere` says; NaN for a plane."""
         from scipy.stats import t
 
         half = self.radius_std * float(t.ppf(0.5 + 0.5 * INTERVAL, self.degrees_of_freedom))
@@ -79,8 +79,7 @@ def fitted_shape(surface: Surface, cloud: PointCloud, inliers: NDArray[np.bool_]
     points = (cloud.offsets - middle) / unit
     residuals = local.distances(points)
     counted = residuals[inliers]
-    jacobian = local.jacobian(points[inliers], np.zeros(local.unknowns))
-    covariance, freedom = block_covariance(jacobian, counted, spatial_blocks(points[inliers]))
+    covariance, freedom = covariance_of(local, points[inliers])
     embedding = local.embedding()
     # Lengths are in units of the extent, an axis in none.
     embedding[:3] *= unit

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from surfsig.shapes.orthogonal import MAX_PASSES, near, refined, settled
 from surfsig.shapes.surface import Array, Surface
+from surfsig.shapes.uncertainty import covariance_of
 
 Mask = NDArray[np.bool_]
 
@@ -45,8 +46,9 @@ class Grown(NamedTuple):
 def grown(kind: type[Surface], points: Array, place: Array, radius: float | None) -> Grown | None:
     """Fit a shape to the points around a place, then to all that are near its surface, until they stand.
 
-    Without a radius, ever more of the nearest points are tried, as noise may look like a small shape, and
-    what is beside the object like a large one: the first shape counts that two starts lead to.
+    Without a radius, ever more of the nearest points are tried, until two starts lead to the same shape.
+    Noise may look like a small shape, and what is beside the object like a large one: of the shapes found by
+    then that one counts whose radius is known best; of planes the one that most starts lead to.
 
     Parameters
     ----------
@@ -78,8 +80,11 @@ def grown(kind: type[Surface], points: Array, place: Array, radius: float | None
             found.append((shape, 1))
         if any(votes == _AGREEMENT for _, votes in found):
             break
-    # Where no two agree, the smallest start's.
-    return max(found, key=lambda pair: pair[1])[0] if found else None
+    if not found:
+        return None
+    # Of equal ones the first, which is the smallest start's.
+    best = min(found, key=lambda pair: (_relative_error(pair[0], points), -pair[1]))
+    return best[0]
 
 
 def _starts(points: Array, place: Array, radius: float | None) -> Iterator[NDArray[np.intp]]:
@@ -121,6 +126,14 @@ def _stands_out(surface: Surface, points: Array) -> bool:
     last = abs(np.linalg.qr(surface.jacobian(points, np.zeros(surface.unknowns)))[1][-1, -1])
     rms = np.sqrt(variance)
     return bool(rms < _DETERMINED * surface.radius * last and rms < _THIN * surface.radius)
+
+
+def _relative_error(shape: Grown, points: Array) -> float:
+    """Give the radius's standard error over the radius; 0 for a plane, infinity where it is not known."""
+    if np.isnan(shape.surface.radius):
+        return 0.0
+    variance = covariance_of(shape.surface, points[shape.inliers])[0][-1, -1]
+    return float(np.sqrt(variance)) / shape.surface.radius if np.isfinite(variance) else np.inf
 
 
 def _same(a: Mask, b: Mask) -> bool:

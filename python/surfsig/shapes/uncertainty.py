@@ -13,14 +13,63 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from surfsig.shapes.surface import Array
+from surfsig.shapes.surface import Array, Surface
 
-BLOCKS = 32
-"""Blocks that the points are cut into: few enough to be larger than what scanners correlate, and so many
-that the standard error is itself known to some 15 %."""
+_BLOCKS = (8, 16, 32)
+"""Blocks that the points may be cut into; of 32 the standard error is itself known to some 15 %."""
+
+_PIECES = 6
+"""Independent pieces that a block should hold at least, so that few of them lie across its border."""
 
 
-def spatial_blocks(points: Array, count: int = BLOCKS) -> NDArray[np.intp]:
+def covariance_of(surface: Surface, points: Array) -> tuple[Array, float]:
+    """Give the covariance of a fitted surface's unknowns, and the degrees of freedom of the last one's.
+
+    Parameters
+    ----------
+    surface
+        Fitted to the points.
+    points
+        (n, 3).
+
+    Returns
+    -------
+    As `block_covariance`, with as many blocks as the residuals' correlation allows.
+    """
+    residuals = surface.distances(points)
+    jacobian = surface.jacobian(points, np.zeros(surface.unknowns))
+    return block_covariance(jacobian, residuals, spatial_blocks(points, block_count(points, residuals)))
+
+
+def block_count(points: Array, residuals: Array) -> int:
+    """Choose how many blocks to cut points into: fewer, the more neighbours err alike.
+
+    The sum of a block's independent residuals has as many times the mean square of one as there are points in
+    the block; by what factor it is larger (the design effect), fewer pieces are independent than points.
+
+    Parameters
+    ----------
+    points
+        (n, 3).
+    residuals
+        Their distances from the surface, (n,).
+
+    Returns
+    -------
+    Blocks, 8 to 32.
+    """
+    squares = float(residuals @ residuals)
+    if squares == 0:
+        return _BLOCKS[-1]
+    effects = [
+        float((np.bincount(spatial_blocks(points, count), residuals) ** 2).sum()) / squares
+        for count in _BLOCKS
+    ]
+    pieces = len(points) / max(1.0, *effects)
+    return int(np.clip(pieces / _PIECES, _BLOCKS[0], _BLOCKS[-1]))
+
+
+def spatial_blocks(points: Array, count: int) -> NDArray[np.intp]:
     """Cut points into blocks of neighbours of nearly equal number, each across its longest extent.
 
     Parameters
