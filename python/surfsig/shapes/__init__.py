@@ -31,10 +31,10 @@ def fit_sphere(
 
     The sum of squared distances from the surface is least. The standard errors do not rely on the number of
     points, which err alike where they are neighbours, but on what the residuals of 8 to 32 blocks of
-    neighbouring points have in common. For independent noise 95 % of the intervals hold the radius; on simulated
-    lidar scans of a sphere, with errors along the ray that are correlated along each line, 80 to 90 %. What a
-    scanner errs over all of the surface is not in them (ray noise at the rim made those spheres 0.3 % too
-    small), nor which points were taken for the surface's.
+    neighbouring points have in common. For independent noise 95 % of the intervals hold the radius; on
+    simulated lidar scans of a sphere, with errors along the ray that are correlated along each line, 80 to
+    90 %. What a scanner errs over all of the surface is not in them (ray noise at the rim made those
+    spheres 0.3 % too small), nor which points were taken for the surface's.
 
     Parameters
     ----------
