@@ -13,7 +13,7 @@ import pytest
 
 import surfsig
 
-COMMANDS = ("info", "extract", "compare", "convert", "completion")
+COMMANDS = ("info", "extract", "fit", "compare", "convert", "completion")
 
 
 def one_line(finished: Any) -> str:
@@ -43,6 +43,7 @@ def test_inputs(shell: Callable[..., Any], tmp_path: Path, content: bytes | None
         ("extract", path, "--radius", 1, "-o", tmp_path / "o.ply"),
         ("compare", path, path, "--at", "0,0,0", "--at", "0,0,0"),
         ("convert", path, tmp_path / "o.ply"),
+        ("fit", "sphere", path),
     ):
         assert message in one_line(shell(*command))
     assert not (tmp_path / "o.ply").exists()

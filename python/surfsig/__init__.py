@@ -19,6 +19,7 @@ from surfsig.extraction import Extraction, FitUsed, Status
 from surfsig.files import read, write
 from surfsig.flat_atom import flat_atom_length
 from surfsig.point_cloud import PointCloud
+from surfsig.shapes import FittedShape, fit_cylinder, fit_plane, fit_sphere
 from surfsig.similarity import flipped, similarity, similarity_class, similarity_matrix
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "Extraction",
     "FileFormatError",
     "FitUsed",
+    "FittedShape",
     "Frame",
     "InvalidInputError",
     "PointCloud",
@@ -36,6 +38,9 @@ __all__ = [
     "downsample",
     "extract",
     "extract_radii",
+    "fit_cylinder",
+    "fit_plane",
+    "fit_sphere",
     "flat_atom_length",
     "flipped",
     "read",

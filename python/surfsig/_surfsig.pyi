@@ -15,6 +15,8 @@ __all__ = [
     "Frame",
     "__version__",
     "extract",
+    "fit_cylinder",
+    "fit_sphere",
     "voxel_representatives",
     "write_e57",
 ]
@@ -40,6 +42,8 @@ def extract(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> list[dict[str, NDArray[Any]]]: ...
+def fit_sphere(points: NDArray[np.float64]) -> tuple[list[float], float] | None: ...
+def fit_cylinder(points: NDArray[np.float64]) -> tuple[list[float], list[float], float] | None: ...
 def voxel_representatives(
     points: NDArray[np.floating], *, origin: Sequence[float], voxel: float
 ) -> NDArray[np.uint32]: ...

@@ -43,3 +43,6 @@ DEPTH_SCALE = 1000.0
 
 SAMPLING_SEED = 0
 """Of the points that are spread over a mesh."""
+
+INTERVAL = 0.95
+"""Probability with which the interval of a fitted radius holds the true one."""

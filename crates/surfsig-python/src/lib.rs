@@ -4,6 +4,7 @@ mod e57;
 mod extract;
 mod frame;
 mod python_file;
+mod shapes;
 
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -53,6 +54,8 @@ mod _surfsig {
     use crate::extract::{extract, voxel_representatives};
     #[pymodule_export]
     use crate::frame::Frame;
+    #[pymodule_export]
+    use crate::shapes::{fit_cylinder, fit_sphere};
 
     use pyo3::prelude::*;
 

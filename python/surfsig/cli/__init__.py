@@ -1,4 +1,4 @@
-"""The command line: `surfsig info`, `clean`, `convert`, `extract`, `compare`, `paper`, `completion`.
+"""The command line: `surfsig info`, `clean`, `convert`, `extract`, `fit`, `compare`, `paper`, `completion`.
 
 Each command is a file here that calls the library's public functions and prints; `run` turns everything that
 can go wrong into one line and an exit code.
@@ -17,6 +17,7 @@ from surfsig.cli.compare import compare_command
 from surfsig.cli.completion import completion_command
 from surfsig.cli.convert import convert_command
 from surfsig.cli.extract import extract_command
+from surfsig.cli.fit import fit_command
 from surfsig.cli.info import info_command
 from surfsig.cli.paper import paper_command
 from surfsig.errors import SurfsigError
@@ -48,6 +49,7 @@ for command in (
     info_command,
     clean_command,
     extract_command,
+    fit_command,
     compare_command,
     convert_command,
     paper_command,

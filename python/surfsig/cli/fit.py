@@ -1,0 +1,107 @@
+"""`surfsig fit`: a sphere, cylinder or plane in a scan, with its radius and how sure it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from surfsig.cli.console import number, print_json, print_table
+from surfsig.cli.options import CLOUD, input_options, json_option, position
+from surfsig.defaults import INTERVAL
+
+if TYPE_CHECKING:
+    from surfsig import FittedShape
+
+
+@click.group("fit", no_args_is_help=True)
+def fit_command() -> None:
+    """Fit a sphere, a cylinder or a plane to a scan, and say how sure it is.
+
+    \b
+    Examples:
+      surfsig fit sphere ball.ply                            all points are the sphere's
+      surfsig fit sphere scan.ply --near 1.7,2.5,0           the one in a scan that is near a place
+      surfsig fit cylinder scan.ply --near 0,0.1,0.7 --radius 0.03 --json | jq .interval
+    """  # noqa: D301
+
+
+def _shape_command(name: str, fit: str, text: str) -> click.Command:
+    """Make the command of one shape: they differ in the function that fits."""
+
+    @click.argument("file", type=CLOUD)
+    @click.option(
+        "--near",
+        type=position,
+        metavar="X,Y,Z",
+        help="A place on the surface: the shape grows from there over the scan.  [default: all points]",
+    )
+    @click.option(
+        "--radius",
+        type=float,
+        metavar="R",
+        help="With --near: of the ball to begin with, about the object's size.  [default: by the points]",
+    )
+    @click.option("--robust", is_flag=True, help="Leave out points that are far from the surface.")
+    @input_options
+    @json_option
+    def command(
+        file: Path,
+        near: tuple[float, float, float] | None,
+        radius: float | None,
+        robust: bool,
+        as_json: bool,
+        **reading: Any,
+    ) -> None:
+        import surfsig
+
+        cloud = surfsig.read(file, **reading)
+        try:
+            shape = getattr(surfsig, fit)(cloud, near=near, radius=radius, robust=robust)
+        except surfsig.InvalidInputError as error:
+            raise surfsig.InvalidInputError(f"{file}: {error}") from None
+        if as_json:
+            print_json({"file": str(file), **_values(shape)})
+        else:
+            print_table(str(file), _rows(shape), err=False)
+
+    return click.command(name, help=text, no_args_is_help=True)(command)
+
+
+def _values(shape: FittedShape) -> dict[str, Any]:
+    values: dict[str, Any] = {"kind": shape.kind, "center": shape.center}
+    if shape.axis is not None:
+        values["axis"] = shape.axis
+    if shape.kind != "plane":
+        values |= {"radius": shape.radius, "radius_std": shape.radius_std, "interval": shape.interval}
+    values |= {"rms": shape.rms, "count": shape.count, "points": len(shape.inliers)}
+    return values | {"covariance": shape.covariance, "degrees_of_freedom": shape.degrees_of_freedom}
+
+
+def _rows(shape: FittedShape) -> list[tuple[str, str]]:
+    errors = shape.covariance.diagonal() ** 0.5
+    rows = []
+    if shape.kind != "plane":
+        low, high = shape.interval
+        size = f"{number(shape.radius)} +- {shape.radius_std:.2g}"
+        rows.append(("radius", f"{size}, {INTERVAL:.0%} interval {number(low)} to {number(high)}"))
+    rows.append(("center", _with_errors(shape.center, errors[:3])))
+    if shape.axis is not None:
+        rows.append(("normal" if shape.kind == "plane" else "axis", _with_errors(shape.axis, errors[3:6])))
+    rows.append(("rms", f"{number(shape.rms)} from the {shape.kind}"))
+    rows.append(("points", f"{shape.count:,} of {len(shape.inliers):,}"))
+    return rows
+
+
+def _with_errors(values: Any, errors: Any) -> str:
+    pairs = zip(values, errors, strict=True)
+    return ", ".join(f"{number(value)} +- {error:.2g}" for value, error in pairs)
+
+
+for _command in (
+    _shape_command("sphere", "fit_sphere", "Fit a sphere to the points of FILE, or to one that is in it."),
+    _shape_command("cylinder", "fit_cylinder", "Fit a cylinder to the points of FILE, or to one in it."),
+    _shape_command("plane", "fit_plane", "Fit a plane to the points of FILE, or to one that is in it."),
+):
+    fit_command.add_command(_command)

@@ -1,0 +1,99 @@
+"""What the fit of a shape gives."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfsig.defaults import INTERVAL
+from surfsig.point_cloud import PointCloud
+from surfsig.shapes.orthogonal import frame_of
+from surfsig.shapes.surface import Array, Kind, Surface
+from surfsig.shapes.uncertainty import covariance_of
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FittedShape:
+    """A sphere, cylinder or plane that was fitted to points, with its errors.
+
+    All lengths are in the points' own unit, all places in their coordinates.
+    """
+
+    kind: Kind
+    """"sphere", "cylinder" or "plane"."""
+    center: Array
+    """(3,): of a sphere its center; of a cylinder and a plane the point of the axis or the plane next to
+    the mean of the points that count."""
+    axis: Array | None
+    """Unit vector (3,): along a cylinder, or across a plane, with a positive z (else y, else x); None for a
+    sphere."""
+    radius: float
+    """NaN for a plane."""
+    covariance: Array
+    """Of center x, y, z; axis x, y, z; radius, in this order and without what the shape does not have: (4, 4)
+    of a sphere, (7, 7) of a cylinder, (6, 6) of a plane. A cylinder's center has no error along the axis, a
+    plane's none within the plane, and an axis none along itself."""
+    degrees_of_freedom: float
+    """Of the radius's standard error; of a plane's shift along its normal."""
+    rms: float
+    """Root mean square of the distances of the points that count."""
+    residuals: Array
+    """Signed distance of each point, (n,), those that do not count included: positive outside, or where a
+    plane's normal points; NaN where a coordinate is not finite."""
+    inliers: NDArray[np.bool_]
+    """Which points count, (n,)."""
+
+    @property
+    def count(self) -> int:
+        """Number of points that count."""
+        return int(self.inliers.sum())
+
+    @property
+    def radius_std(self) -> float:
+        """Standard error of the radius; NaN for a plane."""
+        return math.nan if self.kind == "plane" else math.sqrt(self.covariance[-1, -1])
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The radius's 95 % interval by Student's t, as far as `surfsig.fit_sphere` says; NaN for a plane."""
+        from scipy.stats import t
+
+        half = self.radius_std * float(t.ppf(0.5 + 0.5 * INTERVAL, self.degrees_of_freedom))
+        return self.radius - half, self.radius + half
+
+    def __repr__(self) -> str:
+        size = "" if self.kind == "plane" else f", radius={self.radius:.6g} +- {self.radius_std:.2g}"
+        return (
+            f"FittedShape({self.kind}{size}, rms={self.rms:.3g}, {self.count} of {len(self.inliers)} points)"
+        )
+
+
+def fitted_shape(surface: Surface, cloud: PointCloud, inliers: NDArray[np.bool_]) -> FittedShape:
+    """Describe a surface, in the coordinates of a cloud's offsets, that was fitted to some of its points."""
+    middle, unit = frame_of(cloud.offsets[inliers].astype(np.float64))
+    # About the mean of the points that count, so that the center is next to it; the step of 0 sees to that.
+    local = surface.placed(1 / unit, -middle / unit).moved(np.zeros(surface.unknowns))
+    points = (cloud.offsets - middle) / unit
+    residuals = local.distances(points)
+    counted = residuals[inliers]
+    covariance, freedom = covariance_of(local, points[inliers])
+    embedding = local.embedding()
+    # Lengths are in units of the extent, an axis in none.
+    embedding[:3] *= unit
+    if not np.isnan(local.radius):
+        embedding[-1] *= unit
+    placed = local.placed(unit, cloud.origin + middle)
+    return FittedShape(
+        kind=local.kind,
+        center=placed.center,
+        axis=placed.axis,
+        radius=placed.radius,
+        covariance=embedding @ covariance @ embedding.T,
+        degrees_of_freedom=freedom,
+        rms=unit * float(np.sqrt((counted**2).mean())),
+        residuals=unit * residuals,
+        inliers=inliers,
+    )

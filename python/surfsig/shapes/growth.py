@@ -1,0 +1,194 @@
+"""A shape in a scan, grown from a place on it: all points that are near its surface and hang together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfsig.shapes.orthogonal import MAX_PASSES, near, refined, settled
+from surfsig.shapes.surface import Array, Surface
+from surfsig.shapes.uncertainty import covariance_of
+
+Mask = NDArray[np.bool_]
+
+_FEWEST = 32
+"""Points that the smallest start has; each further one has twice as many."""
+
+_DETERMINED = 0.1
+"""Relative standard error of the radius up to which a start says what the shape is."""
+
+_THIN = 0.1
+"""Points whose distances from a surface are a larger part of its radius are a heap, and not that surface."""
+
+_SAME = 0.5
+"""Two starts lead to the same shape where they share this part of the points of both."""
+
+_AGREEMENT = 2
+"""Starts that must lead to the same shape for no further, larger ones to be tried."""
+
+_HOLDS = 0.95
+"""Part of a shape's points that must hang together; the rest may be strays."""
+
+_FINEST = 2.0**-20
+"""Edge of the finest cells, in extents of the points."""
+
+
+class Grown(NamedTuple):
+    """A surface, and which points it was fitted to, (n,)."""
+
+    surface: Surface
+    inliers: Mask
+
+
+def grown(kind: type[Surface], points: Array, place: Array, radius: float | None) -> Grown | None:
+    """Fit a shape to the points around a place, then to all that are near its surface, until they stand.
+
+    Without a radius, ever more of the nearest points are tried, until two starts lead to the same shape.
+    Noise may look like a small shape, and what is beside the object like a large one: of the shapes found by
+    then that one counts whose radius is known best; of planes the one that most starts lead to.
+
+    Parameters
+    ----------
+    kind
+        Which surface.
+    points
+        (n, 3), the scan.
+    place
+        (3,), on the surface or near it.
+    radius
+        Of the ball whose points are the start, or None.
+
+    Returns
+    -------
+    Grown or None
+        None where there is no such shape.
+    """
+    found: list[tuple[Grown, int]] = []
+    for seeds in _starts(points, place, radius):
+        shape = _from_seeds(kind, points, seeds)
+        if shape is None:
+            continue
+        for number, (other, votes) in enumerate(found):
+            if _same(shape.inliers, other.inliers):
+                # The larger start knows it better.
+                found[number] = (shape, votes + 1)
+                break
+        else:
+            found.append((shape, 1))
+        if any(votes == _AGREEMENT for _, votes in found):
+            break
+    if not found:
+        return None
+    # Of equal ones the first, which is the smallest start's.
+    best = min(found, key=lambda pair: (_relative_error(pair[0], points), -pair[1]))
+    return best[0]
+
+
+def _starts(points: Array, place: Array, radius: float | None) -> Iterator[NDArray[np.intp]]:
+    distances = np.linalg.norm(points - place, axis=1)
+    if radius is not None:
+        yield np.flatnonzero(distances <= radius)
+        return
+    order = np.argsort(distances, kind="stable")
+    count = _FEWEST
+    while count < 2 * len(points):
+        yield order[:count]
+        count *= 2
+
+
+def _from_seeds(kind: type[Surface], points: Array, seeds: NDArray[np.intp]) -> Grown | None:
+    if len(seeds) <= kind.unknowns:
+        return None
+    start = settled(kind, points[seeds], robust=True)
+    if start is None:
+        return None
+    surface, kept = start
+    chosen = np.zeros(len(points), np.bool_)
+    chosen[seeds[kept]] = True
+    if not _stands_out(surface, points[chosen]):
+        return None
+    shape = _spread(surface, points, chosen)
+    return shape if shape and _stands_out(shape.surface, points[shape.inliers]) else None
+
+
+def _stands_out(surface: Surface, points: Array) -> bool:
+    """Tell whether points say how large the surface is, by the error that their number alone promises."""
+    if len(points) <= surface.unknowns:
+        return False
+    if np.isnan(surface.radius):
+        return True
+    residuals = surface.distances(points)
+    variance = residuals @ residuals / (len(points) - surface.unknowns)
+    # The last unknown's variance, that of the radius, is one over the square of the triangle's last entry.
+    last = abs(np.linalg.qr(surface.jacobian(points, np.zeros(surface.unknowns)))[1][-1, -1])
+    rms = np.sqrt(variance)
+    return bool(rms < _DETERMINED * surface.radius * last and rms < _THIN * surface.radius)
+
+
+def _relative_error(shape: Grown, points: Array) -> float:
+    """Give the radius's standard error over the radius; 0 for a plane, infinity where it is not known."""
+    if np.isnan(shape.surface.radius):
+        return 0.0
+    variance = covariance_of(shape.surface, points[shape.inliers])[0][-1, -1]
+    return float(np.sqrt(variance)) / shape.surface.radius if np.isfinite(variance) else np.inf
+
+
+def _same(a: Mask, b: Mask) -> bool:
+    return bool((a & b).sum() > _SAME * (a | b).sum())
+
+
+def _spread(surface: Surface, points: Array, chosen: Mask) -> Grown | None:
+    """Take the points near the surface that hang together with those chosen, and fit it again, to the end."""
+    # A few points may miss the gaps between a scanner's lines.
+    cell = 2 * _longest_gap(points[chosen])
+    for _ in range(MAX_PASSES):
+        distances = surface.distances(points)
+        candidates = np.flatnonzero(near(distances, distances[chosen]))
+        if not len(candidates):
+            return None
+        parts = _parts(points[candidates], cell)
+        votes = np.bincount(parts[chosen[candidates]], minlength=parts.max() + 1)
+        new = np.zeros_like(chosen)
+        new[candidates[parts == votes.argmax()]] = True
+        if np.array_equal(new, chosen):
+            # The whole shape knows its gaps better than the start did: what is farther is something else.
+            gap = _longest_gap(points[chosen])
+            if gap >= cell:
+                break
+            cell = gap
+            continue
+        again = refined(surface, points[new])
+        if again is None:
+            return None
+        surface, chosen = again, new
+    return Grown(surface, chosen)
+
+
+def _longest_gap(points: Array) -> float:
+    """Give an edge of cells at which the points just hang together, within a factor of 2."""
+    cell = extent = float(np.ptp(points, axis=0).max())
+    while cell > extent * _FINEST and np.bincount(_parts(points, 0.5 * cell)).max() >= _HOLDS * len(points):
+        cell *= 0.5
+    return cell
+
+
+def _parts(points: Array, cell: float) -> NDArray[np.intp]:
+    """Give each point the number of its part: points of the same cell, or of cells that touch, are of one."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
+
+    offsets = points - points.min(axis=0)
+    # So that the number of a cell fits into 64 bits.
+    places = (offsets / max(cell, float(offsets.max()) * _FINEST)).astype(np.int64)
+    keys = np.ravel_multi_index(tuple(places.T), tuple(places.max(axis=0) + 1))
+    _, first, of_points = np.unique(keys, return_index=True, return_inverse=True)
+    # Centers of cells that touch are at most sqrt(3) apart, of others at least 2.
+    pairs = KDTree(places[first]).query_pairs(1.8, output_type="ndarray")
+    ones = np.ones(len(pairs), np.int8)
+    graph = coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
+    parts = connected_components(graph, directed=False)[1]
+    return np.asarray(parts[of_points.reshape(-1)], np.intp)

@@ -1,0 +1,332 @@
+"""Fitted spheres, cylinders and planes: exact, calibrated, and robust."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import approx_fprime
+from scipy.stats import t as students_t
+from surface_points import UTM, Array, rotation
+
+import surfsig
+from surfsig import InvalidInputError, PointCloud, fit_cylinder, fit_plane, fit_sphere
+from surfsig.shapes.cylinder import Cylinder
+from surfsig.shapes.plane import Plane
+from surfsig.shapes.sphere import Sphere
+from surfsig.shapes.surface import Surface
+from surfsig.shapes.uncertainty import block_count, block_covariance, spatial_blocks
+
+DRAWS = 300
+
+
+def sphere(rng: np.random.Generator, lowest: float, noise: float = 0.0, count: int = 400) -> Array:
+    """Give points of a unit sphere about 0, as far down as the lowest z."""
+    z, turn = rng.uniform(lowest, 1, count), rng.uniform(0, 2 * np.pi, count)
+    width = np.sqrt(1 - z * z)
+    points = np.column_stack([width * np.cos(turn), width * np.sin(turn), z])
+    return points * (1 + noise * rng.normal(size=(count, 1)))
+
+
+def cylinder(rng: np.random.Generator, arc: float, noise: float = 0.0, count: int = 400) -> Array:
+    """Give points of a unit cylinder along z, of length 2, over an arc."""
+    turn = rng.uniform(-arc / 2, arc / 2, count)
+    radius = 1 + noise * rng.normal(size=count)
+    return np.column_stack([radius * np.cos(turn), radius * np.sin(turn), rng.uniform(-1, 1, count)])
+
+
+def plane(rng: np.random.Generator, noise: float = 0.0, count: int = 400) -> Array:
+    """Give points of the plane z = 0, in a square of side 2."""
+    return np.column_stack([rng.uniform(-1, 1, (count, 2)), noise * rng.normal(size=count)])
+
+
+@pytest.mark.parametrize("place", [np.zeros(3), UTM])
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+def test_shapes_are_exact_without_noise(unit: float, place: Array) -> None:
+    rng = np.random.default_rng(1)
+    turned = rotation(rng)
+    # Coordinates of UTM have no digits below a nanometre.
+    rounding = 1e-9 if place.any() else 0.0
+    ball = fit_sphere(PointCloud(unit * sphere(rng, 0.7) @ turned.T, origin=place))
+    assert ball.kind == "sphere"
+    assert ball.axis is None
+    assert ball.radius == pytest.approx(unit, rel=1e-9)
+    np.testing.assert_allclose(ball.center, place, rtol=0, atol=1e-8 * unit + rounding)
+    pipe = fit_cylinder(PointCloud(unit * cylinder(rng, 1.5) @ turned.T, origin=place))
+    assert pipe.radius == pytest.approx(unit, rel=1e-8)
+    axis = turned[:, 2] * np.sign(turned[2, 2])
+    assert pipe.axis is not None
+    np.testing.assert_allclose(pipe.axis, axis, atol=1e-8)
+    assert np.linalg.norm(np.cross(pipe.center - place, axis)) < 1e-8 * unit + rounding
+    floor = fit_plane(PointCloud(unit * plane(rng) @ turned.T, origin=place))
+    assert math.isnan(floor.radius)
+    assert math.isnan(floor.radius_std)
+    assert floor.axis is not None
+    np.testing.assert_allclose(floor.axis, axis, atol=1e-12)
+    assert abs((floor.center - place) @ axis) < 1e-9 * unit + rounding
+    for shape in (ball, pipe, floor):
+        assert shape.count == 400
+        assert shape.rms < 1e-9 * unit
+        assert np.abs(shape.residuals).max() < 1e-8 * unit
+
+
+def test_it_is_the_orthogonal_distance_that_is_least() -> None:
+    """The sum of squares is stationary where the fit says, and the residuals are the distances."""
+    rng = np.random.default_rng(2)
+    points = sphere(rng, 0.0, 0.05)
+    ball = fit_sphere(points)
+    np.testing.assert_allclose(
+        ball.residuals, np.linalg.norm(points - ball.center, axis=1) - ball.radius, atol=1e-12
+    )
+    assert ball.rms == pytest.approx(math.sqrt((ball.residuals**2).mean()))
+
+    def cost(x: Array) -> float:
+        return float(((np.linalg.norm(points - x[:3], axis=1) - x[3]) ** 2).sum())
+
+    best = np.array([*ball.center, ball.radius])
+    for step in 1e-4 * np.concatenate([np.eye(4), -np.eye(4)]):
+        assert cost(best + step) > cost(best)
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [
+        Sphere(np.array([0.1, 0.2, -0.3]), 0.8),
+        Cylinder(np.array([0.1, -0.2, 0.0]), np.array([0.0, 0.6, 0.8]), 0.7),
+        Plane(np.array([0.0, 0.3, 0.4]), np.array([0.0, 0.6, 0.8])),
+    ],
+)
+def test_jacobians_are_the_derivatives(surface: Surface) -> None:
+    rng = np.random.default_rng(3)
+    points = rng.normal(size=(7, 3))
+    step = 0.1 * rng.normal(size=surface.unknowns)
+    numeric = approx_fprime(step, lambda x: surface.moved(x).distances(points), 1e-7)
+    np.testing.assert_allclose(surface.jacobian(points, step), numeric, atol=1e-6)
+
+
+Draw = Callable[[np.random.Generator, float, float], Array]
+ARCS: list[tuple[Callable[..., surfsig.FittedShape], Draw, float]] = [
+    (fit_sphere, sphere, -1.0),
+    (fit_sphere, sphere, 0.0),
+    (fit_sphere, sphere, 0.8),
+    (fit_cylinder, cylinder, 2 * np.pi),
+    (fit_cylinder, cylinder, np.pi),
+    (fit_cylinder, cylinder, np.pi / 2),
+]
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.01, 0.03])
+@pytest.mark.parametrize(("fit", "draw", "extent"), ARCS)
+def test_standard_errors_of_radii_are_calibrated(
+    fit: Callable[..., surfsig.FittedShape], draw: Draw, extent: float, noise: float
+) -> None:
+    rng = np.random.default_rng(4)
+    shapes = [fit(draw(rng, extent, noise)) for _ in range(DRAWS)]
+    radii = np.array([shape.radius for shape in shapes])
+    errors = np.array([shape.radius_std for shape in shapes])
+    assert abs(radii.mean() - 1) < 0.2 * radii.std()
+    assert 0.9 < math.sqrt((errors**2).mean()) / radii.std() < 1.1
+    # Standard errors have few degrees of freedom: a ratio is Student's, whose deviation is a little above 1.
+    freedom = np.mean([shape.degrees_of_freedom for shape in shapes])
+    assert 10 < freedom < 32
+    assert 0.9 < ((radii - 1) / errors).std() / students_t.std(freedom) < 1.1
+    inside = [shape.interval[0] <= 1 <= shape.interval[1] for shape in shapes]
+    assert 0.92 < np.mean(inside) < 0.98
+
+
+def test_the_covariance_of_all_values_is_calibrated() -> None:
+    rng = np.random.default_rng(5)
+    found = [fit_cylinder(cylinder(rng, np.pi, 0.01)) for _ in range(DRAWS)]
+    values = np.array([[*shape.center[:2], *shape.axis[:2], shape.radius] for shape in found])  # type: ignore[index]
+    kept = [0, 1, 3, 4, 6]
+    expected = np.mean([shape.covariance for shape in found], axis=0)
+    assert expected.shape == (7, 7)
+    # A center has no error along the axis, and an axis none along itself.
+    assert abs(expected[2, 2]) + abs(expected[5, 5]) < 1e-3 * expected[4, 4]
+    measured = np.cov(values.T)
+    scale = np.sqrt(np.diag(measured))
+    np.testing.assert_allclose(
+        expected[np.ix_(kept, kept)] / np.outer(scale, scale), measured / np.outer(scale, scale), atol=0.2
+    )
+
+
+def test_the_covariance_of_a_plane_is_calibrated() -> None:
+    rng = np.random.default_rng(6)
+    found = [fit_plane(plane(rng, 0.01)) for _ in range(DRAWS)]
+    expected = np.mean([shape.covariance for shape in found], axis=0)
+    assert expected.shape == (6, 6)
+    # Height: noise / sqrt(n). Slope: that over the deviation of x, 1 / sqrt(3).
+    assert math.sqrt(expected[2, 2]) == pytest.approx(0.01 / 20, rel=0.05)
+    assert math.sqrt(expected[3, 3]) == pytest.approx(0.01 / 20 * math.sqrt(3), rel=0.05)
+    assert np.std([shape.axis[0] for shape in found]) == pytest.approx(  # type: ignore[index]
+        math.sqrt(expected[3, 3]), rel=0.1
+    )
+
+
+def independent_error(points: Array, shape: surfsig.FittedShape) -> float:
+    """Give the standard error of a sphere's radius that points without correlation would have."""
+    normals = (points - shape.center) / np.linalg.norm(points - shape.center, axis=1)[:, None]
+    jacobian = np.column_stack([normals, np.ones(len(points))])
+    return shape.rms * math.sqrt(np.linalg.inv(jacobian.T @ jacobian)[3, 3])
+
+
+def test_points_that_err_alike_do_not_narrow_the_interval() -> None:
+    """The points of a small patch have one error in common: their number says nothing, the blocks do."""
+    rng = np.random.default_rng(7)
+    inside, naive = [], []
+    for _ in range(DRAWS):
+        points = sphere(rng, 0.0, count=3000)
+        patches = spatial_blocks(points, 200)
+        points *= 1 + 0.01 * rng.normal(size=200)[patches, None]
+        shape = fit_sphere(points)
+        inside.append(shape.interval[0] <= 1 <= shape.interval[1])
+        naive.append(abs(shape.radius - 1) < 1.96 * independent_error(points, shape))
+    assert np.mean(naive) < 0.5
+    assert 0.9 < np.mean(inside) < 0.99
+
+
+def test_noise_along_the_ray_keeps_the_interval_honest() -> None:
+    """A scanner far up errs along z: much at the top of the sphere, hardly at its rim."""
+    rng = np.random.default_rng(8)
+    shapes = []
+    for _ in range(DRAWS):
+        points = sphere(rng, 0.2)
+        points[:, 2] += 0.01 * rng.normal(size=len(points))
+        shapes.append(fit_sphere(points))
+    spread = np.std([shape.radius for shape in shapes])
+    assert 0.9 < np.sqrt(np.mean([shape.radius_std**2 for shape in shapes])) / spread < 1.2
+    assert np.mean([shape.interval[0] <= 1 <= shape.interval[1] for shape in shapes]) > 0.93
+
+
+def lidar(rng: np.random.Generator, distance: float) -> Array:
+    """Give a sphere of radius 0.3 as a lidar of 16 lines sees it, whose errors are alike along each line."""
+    azimuth = np.radians(np.arange(-10, 10, 0.2))
+    memory = math.exp(-1 / 20)
+    lines = []
+    for elevation in np.radians(np.arange(-15, 16, 2) + rng.uniform(-1, 1)):
+        rays = np.column_stack(
+            [
+                np.cos(azimuth) * math.cos(elevation),
+                np.sin(azimuth) * math.cos(elevation),
+                np.full(len(azimuth), math.sin(elevation)),
+            ]
+        )
+        along = rays[:, 0] * distance
+        hit = along**2 - distance**2 + 0.3**2
+        drift = [rng.normal()]
+        for _ in azimuth[1:]:
+            drift.append(memory * drift[-1] + math.sqrt(1 - memory**2) * rng.normal())
+        error = 0.007 * rng.normal(size=len(azimuth)) + 0.006 * np.array(drift)
+        ranges = along - np.sqrt(np.maximum(hit, 0)) + error
+        lines.append((rays * ranges[:, None])[hit > 0])
+    return np.concatenate(lines)
+
+
+def test_intervals_of_lidar_scans_hold_the_radius_far_more_often_than_naive_ones() -> None:
+    rng = np.random.default_rng(15)
+    inside, naive = [], []
+    for _ in range(DRAWS):
+        points = lidar(rng, rng.uniform(2.4, 3))
+        shape = fit_sphere(points, robust=True)
+        inside.append(shape.interval[0] <= 0.3 <= shape.interval[1])
+        naive.append(abs(shape.radius - 0.3) < 1.96 * independent_error(points[shape.inliers], shape))
+    assert np.mean(inside) > 0.8
+    assert np.mean(naive) < 0.7
+
+
+def test_there_are_fewer_blocks_where_neighbours_err_alike() -> None:
+    rng = np.random.default_rng(16)
+    points = sphere(rng, 0.0)
+    assert block_count(points, rng.normal(size=400)) == 32
+    assert block_count(points, rng.normal(size=50)[spatial_blocks(points, 50)]) < 12
+    assert block_count(points, np.zeros(400)) == 32
+
+
+def test_block_covariance_with_blocks_of_one_point_is_the_known_one() -> None:
+    """With a block for each point it is White's estimator HC2: sum of x x^T r^2 / (1 - leverage)."""
+    rng = np.random.default_rng(9)
+    x, r = rng.normal(size=(40, 3)), rng.normal(size=40)
+    inverse = np.linalg.inv(x.T @ x)
+    leverage = np.einsum("ij,jk,ik->i", x, inverse, x)
+    expected = inverse @ (x.T * (r**2 / (1 - leverage))) @ x @ inverse
+    found, freedom = block_covariance(x, r, np.arange(40))
+    np.testing.assert_allclose(found, expected, rtol=1e-10)
+    # Satterthwaite's: (sum of eigenvalues)^2 / sum of squares, of the quadratic form in the noise.
+    annihilator = np.eye(40) - x @ inverse @ x.T
+    weights = annihilator * (x @ inverse[:, 2] / np.sqrt(1 - leverage))
+    values = np.linalg.eigvalsh(weights.T @ weights)
+    assert freedom == pytest.approx(values.sum() ** 2 / (values**2).sum(), rel=1e-10)
+
+
+def test_blocks_are_neighbours_of_equal_number() -> None:
+    points = np.random.default_rng(10).uniform(size=(1000, 3))
+    labels = spatial_blocks(points, 32)
+    assert set(np.bincount(labels)) <= {31, 32}
+    extents = [np.ptp(points[labels == block], axis=0).max() for block in range(32)]
+    assert max(extents) < 0.6
+    np.testing.assert_array_equal(np.sort(spatial_blocks(points[:7], 32)), np.arange(7))
+
+
+@pytest.mark.parametrize(
+    ("fit", "points"),
+    [
+        (fit_sphere, sphere(np.random.default_rng(11), 0.0, 0.002)),
+        (fit_cylinder, cylinder(np.random.default_rng(11), np.pi, 0.002)),
+        (fit_plane, plane(np.random.default_rng(11), 0.002)),
+    ],
+)
+def test_robust_fits_leave_out_strays(fit: Callable[..., surfsig.FittedShape], points: Array) -> None:
+    rng = np.random.default_rng(12)
+    strays = rng.uniform(-1, 1, (44, 3))
+    clean, found = fit(points), fit(np.concatenate([points, strays]), robust=True)
+    assert found.inliers[:400].mean() > 0.98
+    assert found.inliers[400:].mean() < 0.1
+    np.testing.assert_allclose(found.center, clean.center, atol=0.002)
+    if fit is not fit_plane:
+        assert abs(found.radius - 1) < 4 * found.radius_std
+
+
+def test_points_that_are_not_finite_do_not_count() -> None:
+    points = sphere(np.random.default_rng(13), 0.0, 0.01)
+    holes = np.insert(points, [0, 7], np.nan, axis=0)
+    whole, found = fit_sphere(points), fit_sphere(holes)
+    assert found.radius == whole.radius
+    assert list(np.flatnonzero(~found.inliers)) == [0, 8]
+    assert np.isnan(found.residuals[[0, 8]]).all()
+
+
+def test_a_representation_says_the_radius_and_its_error() -> None:
+    shape = fit_sphere(sphere(np.random.default_rng(14), -1.0, 0.01))
+    assert repr(shape).startswith("FittedShape(sphere, radius=0.9995")
+    assert "400 of 400 points" in repr(shape)
+
+
+def test_as_many_points_as_unknowns_and_one_have_no_error_that_is_known() -> None:
+    """Four points of a circle and one beside it: without that one there is no sphere."""
+    shape = fit_sphere([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]])
+    assert shape.radius == pytest.approx(1)
+    assert math.isnan(shape.radius_std)
+
+
+CIRCLE = [[math.cos(t), math.sin(t), 0.0] for t in range(9)]
+
+
+@pytest.mark.parametrize(
+    ("fit", "points", "message"),
+    [
+        (fit_sphere, [[0, 0, 0]] * 4, "a sphere takes at least 5 points, not 4"),
+        (fit_cylinder, np.full((9, 3), np.nan), "a cylinder takes at least 6 points, not 0"),
+        (fit_sphere, [[1, 2, 3]] * 9, "the points determine no sphere"),
+        (fit_sphere, CIRCLE, "the points determine no sphere"),
+        (fit_plane, [[i, 2 * i, 3 * i] for i in range(9)], "the points determine no plane"),
+        (fit_plane, np.full((9, 3), 1e200), "coordinates must be within"),
+        (fit_plane, np.zeros((9, 2)), "the shape"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused(
+    fit: Callable[..., surfsig.FittedShape], points: NDArray[np.float64], message: str
+) -> None:
+    for robust in (False, True):
+        with pytest.raises(InvalidInputError, match=message):
+            fit(points, robust=robust)
