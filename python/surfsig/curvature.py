@@ -127,7 +127,8 @@ def extract_radii(
 ) -> list[Extraction]:
     """Extract curvature from balls of several radii around each place, in one pass over the points.
 
-    Values differ from those of `extract` with one radius by rounding only: |dk| <= 1e-5 max(|k|, 1 / radius).
+    Values differ from those of `extract` with one radius by rounding only: |dk| <= 1e-5 max(|k|, 1 / radius);
+    a point whose distance is the radius, within rounding, may count in one of them only.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -20,6 +20,7 @@ from surfsig.cli.options import (
     json_option,
     position,
     quiet_option,
+    radius_or_auto,
     threads_option,
 )
 
@@ -37,7 +38,11 @@ QUANTILES = (0.05, 0.5, 0.95)
 @click.command("extract", no_args_is_help=True)
 @click.argument("file", type=CLOUD)
 @click.option(
-    "--radius", type=float, help="Of the neighbourhood, in the file's unit; with --unit, in metres."
+    "--radius",
+    type=radius_or_auto,
+    metavar="R|auto",
+    help="Of the neighbourhood, in the file's unit; with --unit, in metres. auto: for each point the largest "
+    "that its surface explains.",
 )
 @click.option(
     "--neighbors",
@@ -79,7 +84,7 @@ QUANTILES = (0.05, 0.5, 0.95)
 @quiet_option
 def extract_command(
     file: Path,
-    radius: float | None,
+    radius: float | Literal["auto"] | None,
     neighbors: int | None,
     output: Path,
     signatures: bool,
@@ -100,7 +105,8 @@ def extract_command(
     The output has the input's points and fields, and k1, k2, gaussian_curvature, mean_curvature (per unit of
     length; a bump seen from the sensor is positive), nx ny nz, direction_x _y _z (along k1), the standard
     errors mean_curvature_std, k1_std, k2_std, noise, residual, condition, count, status (0 is ok), linearity,
-    planarity, scattering; zeta with --like; radius with --neighbors. NaN where there is no value.
+    planarity, scattering; zeta with --like; radius with --neighbors or --radius auto. NaN where there is no
+    value.
 
     \b
     Examples:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -26,6 +26,16 @@ def _numbers(text: str, count: int, example: str) -> list[float]:
         word = {3: "three", 4: "four", 6: "six"}[count]
         raise click.BadParameter(f"{text!r} is not {word} numbers such as {example}")
     return values
+
+
+def radius_or_auto(text: str) -> float | Literal["auto"]:
+    """Turn "0.02" into a number, and leave the word "auto"."""
+    if text == "auto":
+        return "auto"
+    try:
+        return float(text)
+    except ValueError:
+        raise click.BadParameter(f"must be a number, or auto, not {text!r}") from None
 
 
 def position(text: str) -> tuple[float, float, float]:

@@ -96,9 +96,6 @@ impl Climb<'_> {
         let mut active: Vec<(usize, Growth)> =
             queries.into_iter().map(|query| (query, Growth::default())).collect();
         for pass in first..first + PASSES {
-            if active.is_empty() {
-                return Ok(());
-            }
             let numbers: Vec<usize> = active.iter().map(|(query, _)| *query).collect();
             let steps = (0..STEPS).map(|step| pass * (STEPS - 1) + step);
             let radii = steps.map(radius_of).collect::<Result<Vec<Radius>, Error>>()?;
@@ -122,6 +119,9 @@ impl Climb<'_> {
             self.monitor.add(ended.len());
             if !lower.is_empty() {
                 self.from(first - 1, lower)?;
+            }
+            if active.is_empty() {
+                break;
             }
         }
         Ok(())
@@ -201,12 +201,14 @@ impl Growth {
     fn climb(&mut self, balls: &[Extraction], place: usize, best: &mut Option<usize>) -> bool {
         let mut smaller = self.begun.then(|| Shown::of(&balls[0], place));
         for (number, ball) in balls.iter().enumerate().skip(usize::from(self.begun)) {
-            if !begins(ball, place) || self.begun && ball.count[place] > MOST {
-                if self.begun {
-                    return false;
+            if self.begun && ball.count[place] > MOST {
+                return false;
+            }
+            if !begins(ball, place) {
+                if !self.begun {
+                    // Until there is a surface, what the largest ball says stands.
+                    *best = Some(number);
                 }
-                // Until there is a surface, what the largest ball says stands.
-                *best = Some(number);
                 continue;
             }
             let shown = Shown::of(ball, place);

@@ -13,7 +13,7 @@ const SMALLEST: f64 = 1.0 / 8.0;
 /// The points of the largest ball are looked at once, and each is summed once, in the shell between two radii.
 /// Only where a ball holds many hundreds of points each radius has a pass of its own, by the hierarchy. A value
 /// differs from that of [`extract`](super::extract()) with this radius alone by no more than rounding does:
-/// |dk| <= 1e-5 max(|k|, 1/r).
+/// |dk| <= 1e-5 max(|k|, 1/r), and a point whose distance is the radius within rounding may count in one of them only.
 ///
 /// The monitor counts each query once for each radius.
 ///
