@@ -22,7 +22,7 @@ pub enum Points<'py> {
 }
 
 impl Points<'_> {
-    fn cloud(&self, origin: [f64; 3]) -> PyResult<PointCloud<'_>> {
+    pub fn cloud(&self, origin: [f64; 3]) -> PyResult<PointCloud<'_>> {
         let offsets = match self {
             Self::F32(array) => Offsets::F32(rows::<f32, 3>(array)?),
             Self::F64(array) => Offsets::F64(rows::<f64, 3>(array)?),
@@ -147,7 +147,7 @@ pub fn extract<'py>(
 }
 
 /// Runs the work on a thread of its own, so that this one can answer Ctrl-C.
-fn watched<T: Send>(
+pub fn watched<T: Send>(
     run: impl FnOnce() -> Result<T, surfsig::Error> + Send,
     report: impl Fn() -> PyResult<()>,
     cancel: impl Fn(),

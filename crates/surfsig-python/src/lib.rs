@@ -5,6 +5,7 @@ mod extract;
 mod frame;
 mod python_file;
 mod shapes;
+mod surfaces;
 
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -56,6 +57,8 @@ mod _surfsig {
     use crate::frame::Frame;
     #[pymodule_export]
     use crate::shapes::{fit_cylinder, fit_sphere};
+    #[pymodule_export]
+    use crate::surfaces::find_surfaces;
 
     use pyo3::prelude::*;
 

@@ -44,6 +44,7 @@ mod point_cloud;
 mod shells;
 mod simd;
 mod similarity;
+mod surfaces;
 mod threads;
 
 pub use cell_index::CellIndex;
@@ -61,4 +62,5 @@ pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use simd::InstructionSet;
 pub use similarity::{GOOD, OPTIMAL, SimilarityClass, similarity};
+pub use surfaces::{FoundSurface, FoundSurfaces, SurfaceKind, SurfaceOptions, find_surfaces};
 pub use threads::with_threads;

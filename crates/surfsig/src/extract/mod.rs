@@ -120,13 +120,24 @@ pub fn extract_monitored(
     let neighborhood = neighborhood.into();
     neighborhood.check()?;
     check(cloud, queries, options)?;
-    with_threads(options.threads, || match neighborhood {
+    with_threads(options.threads, || extract_within(cloud, neighborhood, queries, options, monitor))?
+}
+
+/// The same, on the threads that are there, with options that go together.
+pub(crate) fn extract_within(
+    cloud: &PointCloud<'_>,
+    neighborhood: Neighborhood,
+    queries: &Queries<'_>,
+    options: &ExtractOptions<'_>,
+    monitor: &Monitor,
+) -> Result<Extraction, Error> {
+    match neighborhood {
         Neighborhood::Ball(radius) | Neighborhood::Hybrid { radius, .. } => {
             let found = run(cloud, &Balls::one(radius), neighborhood, queries, options, monitor)?;
             Ok(found.of_balls.into_iter().next().expect("one ball was asked for"))
         }
         Neighborhood::Nearest(k) => run_nearest(cloud, k, queries, options, monitor),
-    })?
+    }
 }
 
 /// What the options and the queries ask for together.

@@ -1,0 +1,54 @@
+//! The surfaces of a scan, for Python.
+
+use crate::extract::{Points, watched};
+use numpy::{IntoPyArray, PyArray1, ToPyArray};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use surfsig::{Monitor, SurfaceKind, SurfaceOptions};
+
+/// Find surfaces; see `surfsig.surfaces`. The labels, and a dictionary for each surface.
+#[pyfunction]
+#[pyo3(signature = (points, *, origin, kinds, min_points=None, noise=None, threads=None, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
+#[expect(clippy::type_complexity, reason = "a tuple in Python")]
+pub fn find_surfaces<'py>(
+    py: Python<'py>,
+    points: Points<'py>,
+    origin: [f64; 3],
+    kinds: Vec<String>,
+    min_points: Option<usize>,
+    noise: Option<f64>,
+    threads: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(Bound<'py, PyArray1<i32>>, Vec<Bound<'py, PyDict>>)> {
+    let cloud = points.cloud(origin)?;
+    let kind = |name: &String| SurfaceKind::ALL.into_iter().find(|kind| kind.name() == name);
+    let kinds: Option<Vec<SurfaceKind>> = kinds.iter().map(kind).collect();
+    let kinds = kinds.ok_or_else(|| PyValueError::new_err("unknown kind"))?;
+    let options = SurfaceOptions { fewest: min_points, noise, kinds, threads };
+    let monitor = Monitor::default();
+    let report = || -> PyResult<()> {
+        Python::attach(|py| {
+            py.check_signals()?;
+            progress.as_ref().map_or(Ok(()), |call| call.call1(py, (monitor.done(), cloud.len())).map(|_| ()))
+        })
+    };
+    let run = || surfsig::find_surfaces(&cloud, &options, &monitor);
+    let found = py.detach(|| watched(run, report, || monitor.cancel()))?;
+    report()?;
+    let surfaces = found.surfaces.iter().map(|surface| {
+        let entry = PyDict::new(py);
+        entry.set_item("kind", surface.kind.name())?;
+        entry.set_item("point", surface.point.to_pyarray(py))?;
+        entry.set_item("axis", surface.axis.to_pyarray(py))?;
+        entry.set_item("radius", surface.radius)?;
+        entry.set_item("major_radius", surface.major_radius)?;
+        entry.set_item("half_angle", surface.half_angle)?;
+        entry.set_item("deviation", surface.deviation)?;
+        entry.set_item("count", surface.count)?;
+        Ok(entry)
+    });
+    let surfaces = surfaces.collect::<PyResult<_>>()?;
+    Ok((found.labels.into_pyarray(py), surfaces))
+}

@@ -1,0 +1,126 @@
+//! Which points are next to each other.
+
+use crate::ball::{BallVisitor, DirectWalk};
+use crate::cell_index::CellIndex;
+use crate::simd::InstructionSet;
+use crate::simd::select::Block;
+use crate::{Error, Monitor, Radius};
+use rayon::prelude::*;
+
+/// Points that are neighbours of each point.
+pub(super) const NEIGHBOURS: usize = 12;
+
+/// Times that the ball is doubled for points that have too few neighbours in it.
+const DOUBLINGS: usize = 5;
+
+/// No neighbour.
+pub(super) const NOBODY: u32 = u32::MAX;
+
+/// The nearest neighbours of each point, the nearest first.
+pub(super) struct Graph {
+    pub neighbours: Vec<[u32; NEIGHBOURS]>,
+    /// Distances to the first and to the last of them; infinite where there are fewer.
+    pub nearest: Vec<f32>,
+    pub farthest: Vec<f32>,
+}
+
+/// A point, and its neighbours: the square of each distance, and its rank.
+type Near = (u32, Vec<(f32, u32)>);
+
+/// Remembers the members of a ball by their distance.
+#[derive(Default)]
+struct Nearest(Vec<(f32, u32)>);
+
+impl BallVisitor for Nearest {
+    const WANTS_RANKS: bool = true;
+
+    fn visit(&mut self, block: &Block, len: usize) {
+        let square = |i: usize| block.x[i] * block.x[i] + block.y[i] * block.y[i] + block.z[i] * block.z[i];
+        self.0.extend((0..len).map(|i| (square(i), block.rank[i])));
+    }
+}
+
+impl Graph {
+    /// Of points within a radius that holds enough for most.
+    pub fn new(positions: &[[f64; 3]], radius: Radius, monitor: &Monitor) -> Result<Self, Error> {
+        let mut graph = Self {
+            neighbours: vec![[NOBODY; NEIGHBOURS]; positions.len()],
+            nearest: vec![f32::INFINITY; positions.len()],
+            farthest: vec![f32::INFINITY; positions.len()],
+        };
+        let mut left: Vec<u32> = (0..positions.len() as u32).collect();
+        let mut size = radius.get();
+        for _ in 0..=DOUBLINGS {
+            let radius = Radius::new(size)?;
+            let index = CellIndex::of_positions(positions.len(), |i| Some(positions[i]), radius, monitor)?;
+            let wanted = NEIGHBOURS.min(index.len().saturating_sub(1));
+            let mut asked = vec![false; positions.len()];
+            left.iter().for_each(|&i| asked[i as usize] = true);
+            graph.fill(&index, &asked, size as f32, monitor)?;
+            left.retain(|&i| wanted > 0 && graph.neighbours[i as usize][wanted - 1] == NOBODY);
+            if left.is_empty() {
+                break;
+            }
+            size *= 2.0;
+        }
+        Ok(graph)
+    }
+
+    /// Looks through the balls of the points that are asked for.
+    fn fill(&mut self, index: &CellIndex, asked: &[bool], size: f32, monitor: &Monitor) -> Result<(), Error> {
+        let set = InstructionSet::detect();
+        let rows: Vec<Vec<Near>> = index
+            .rows
+            .par_chunks(16)
+            .map_init(
+                || (DirectWalk::new(index, set), Nearest::default()),
+                |(walk, nearest), rows| {
+                    monitor.check()?;
+                    let mut found = Vec::new();
+                    for row in rows {
+                        for rank in row.start..row.end {
+                            let point = index.point_of_rank[rank];
+                            if !asked[point as usize] {
+                                continue;
+                            }
+                            let offset = [index.x[rank], index.y[rank], index.z[rank]];
+                            walk.enter_row(row.key);
+                            walk.enter_run(offset, offset);
+                            nearest.0.clear();
+                            walk.visit(offset, nearest);
+                            let members = &mut nearest.0;
+                            members.retain(|&(_, other)| other as usize != rank);
+                            let order =
+                                |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+                            if members.len() > NEIGHBOURS {
+                                members.select_nth_unstable_by(NEIGHBOURS - 1, order);
+                                members.truncate(NEIGHBOURS);
+                            }
+                            members.sort_unstable_by(order);
+                            found.push((point, members.clone()));
+                        }
+                    }
+                    Ok(found)
+                },
+            )
+            .collect::<Result<_, Error>>()?;
+        for (point, members) in rows.into_iter().flatten() {
+            let point = point as usize;
+            for (slot, (_, rank)) in self.neighbours[point].iter_mut().zip(&members) {
+                *slot = index.point_of_rank[*rank as usize];
+            }
+            if let Some((square, _)) = members.first() {
+                self.nearest[point] = size * square.sqrt();
+            }
+            if members.len() == NEIGHBOURS {
+                self.farthest[point] = size * members[NEIGHBOURS - 1].0.sqrt();
+            }
+        }
+        Ok(())
+    }
+
+    /// The neighbours of a point.
+    pub fn of(&self, point: u32) -> impl Iterator<Item = u32> + '_ {
+        self.neighbours[point as usize].iter().copied().take_while(|&other| other != NOBODY)
+    }
+}

@@ -1,0 +1,193 @@
+//! A surface that grows over its neighbours.
+
+use super::least_squares::refine;
+use super::primitive::{Primitive, SurfaceKind, Vector};
+use super::scene::{Scene, Stamps};
+use super::start::{bent, start};
+
+/// Points around a seed from which a surface begins.
+const FIRST: usize = 24;
+
+/// Points that a fit looks at while a surface still grows.
+const SAMPLE: usize = 1500;
+
+/// Points that decide about a kind of surface before it grows.
+const SAMPLE_OF_KIND: usize = 400;
+
+/// Standard deviations from the surface at which points belong to it.
+const NEAR: f64 = 3.5;
+
+/// What a surface's standard deviation may be, in units of the noise of its points' surroundings: neighbouring points
+/// of a scan may err together.
+const ROUGHEST: f64 = 3.0;
+
+/// Rounds of growing and fitting.
+const MAX_ROUNDS: usize = 30;
+
+/// A surface of a kind with more parameters must gain this share of points, ...
+const MORE: f64 = 1.15;
+
+/// ... or explain those that there are so much better: of the mean square there is no more left.
+const BETTER: f64 = 0.8;
+
+/// Of several kinds the simplest is taken whose standard deviation is at most so many times the least.
+const AS_GOOD: f64 = 1.6;
+
+/// A seed's first points need no surface with more parameters where one has this much of the noise.
+const ENOUGH: f64 = 1.3;
+
+/// Evidence, in units of the logarithm of likelihood, for a parameter more.
+const EVIDENCE: f64 = 10.0;
+
+/// A surface, and the points that belong to it.
+pub(super) struct Region {
+    pub primitive: Primitive,
+    pub members: Vec<u32>,
+    /// Standard deviation of its points' distances.
+    pub deviation: f64,
+}
+
+/// What grows surfaces.
+pub(super) struct Grower<'a> {
+    pub scene: &'a Scene,
+    pub kinds: &'a [SurfaceKind],
+    pub fewest: usize,
+    pub seen: &'a mut Stamps,
+    pub inside: &'a mut Stamps,
+}
+
+impl Grower<'_> {
+    /// The surface that grows from a seed, and the points around the seed from which it began.
+    pub fn region_around(&mut self, seed: u32) -> (Option<Region>, Vec<u32>) {
+        let first = self.scene.around(seed, FIRST, self.seen);
+        let noise = self.scene.noise_around(seed, self.seen);
+        let mut best: Option<Region> = None;
+        if first.len() < FIRST / 2 || !noise.is_finite() {
+            return (None, first);
+        }
+        for start in self.first_surfaces(&first, noise) {
+            if let Some(region) = self.grow(start, &first, noise)
+                && best.as_ref().is_none_or(|best| region.is_better_than(best))
+            {
+                best = Some(region);
+            }
+        }
+        for &kind in self.kinds {
+            let Some(simpler) = best.as_ref().filter(|best| best.primitive.kind < kind) else { continue };
+            if simpler.deviation <= self.scene.floor {
+                break;
+            }
+            if let Some(start) = self.more_complex(kind, simpler)
+                && let Some(region) = self.grow(start, &simpler.members, noise)
+                && region.is_better_than(simpler)
+            {
+                best = Some(region);
+            }
+        }
+        (best.filter(|region| region.members.len() >= self.fewest), first)
+    }
+
+    /// The simplest surface that explains a seed's first points as well as any.
+    fn first_surfaces(&self, first: &[u32], noise: f64) -> Option<Primitive> {
+        let (points, normals) = self.scene.sample(first, FIRST);
+        let mut fits: Vec<(Primitive, f64)> = Vec::new();
+        for &kind in self.kinds {
+            let simpler = fits.iter().map(|(primitive, _)| *primitive).collect::<Vec<_>>();
+            if let Some(fit) = fitted(kind, &points, &normals, &simpler) {
+                fits.push(fit);
+                if fit.1 <= ENOUGH * noise {
+                    break;
+                }
+            }
+        }
+        let least = fits.iter().map(|(_, deviation)| *deviation).fold(f64::INFINITY, f64::min);
+        let enough = AS_GOOD * least + 0.1 * self.scene.floor;
+        let (primitive, deviation) = fits.into_iter().find(|(_, deviation)| *deviation <= enough)?;
+        (deviation <= 2.0 * noise + self.scene.floor).then_some(primitive)
+    }
+
+    /// A surface of a kind with more parameters near the points of a simpler one, if it explains them much better.
+    fn more_complex(&self, kind: SurfaceKind, simpler: &Region) -> Option<Primitive> {
+        let (points, normals) = self.scene.sample(&simpler.members, SAMPLE_OF_KIND);
+        let (primitive, deviation) = fitted(kind, &points, &normals, &[simpler.primitive])?;
+        let more = kind.parameters() - simpler.primitive.kind.parameters();
+        let gain = points.len() as f64 * (simpler.deviation.max(1e-300) / deviation.max(1e-300)).ln();
+        (gain > EVIDENCE * more as f64).then_some(primitive)
+    }
+
+    /// Grows a surface from some points: fits, takes the near points that hang together, and fits again.
+    fn grow(&mut self, start: Primitive, from: &[u32], noise: f64) -> Option<Region> {
+        let scene = self.scene;
+        let mut region = Region { primitive: start, members: from.to_vec(), deviation: 0.0 };
+        for _ in 0..MAX_ROUNDS {
+            let before = region.members.len();
+            region.fit(scene, SAMPLE)?;
+            let most = 2 * before;
+            let tolerance = region.tolerance(noise, scene.floor);
+            let chart = region.primitive.chart();
+            region.members = scene.reached(&chart, tolerance, &region.members, most, self.seen);
+            let after = region.members.len();
+            if after < FIRST / 2 {
+                return None;
+            }
+            if after < most && after.abs_diff(before) <= after / 500 {
+                break;
+            }
+        }
+        region.members = scene.largest_part(&region.members, self.seen, self.inside);
+        region.fit(scene, SAMPLE)?;
+        Some(region)
+    }
+}
+
+/// A surface of a kind through points, and their standard deviation from it; begun from the normals, and from
+/// simpler surfaces through the same points.
+fn fitted(
+    kind: SurfaceKind,
+    points: &[Vector],
+    normals: &[Vector],
+    simpler: &[Primitive],
+) -> Option<(Primitive, f64)> {
+    let (count, parameters) = (points.len(), kind.parameters());
+    if count < parameters + 5 {
+        return None;
+    }
+    let extent = extent(points);
+    let starts =
+        start(kind, points, normals).into_iter().chain(simpler.iter().flat_map(|p| bent(p, kind, extent)));
+    let fits = starts.filter_map(|start| refine(start, points, extent));
+    let best = fits.min_by(|a, b| a.rms.total_cmp(&b.rms))?;
+    Some((best.primitive, best.rms * (count as f64 / (count - parameters) as f64).sqrt()))
+}
+
+impl Region {
+    /// Whether it has more points than another, or explains about as many much better.
+    fn is_better_than(&self, other: &Self) -> bool {
+        let (size, old) = (self.members.len() as f64, other.members.len() as f64);
+        size >= MORE * old || size >= old / MORE && self.deviation.powi(2) < BETTER * other.deviation.powi(2)
+    }
+
+    /// Fits the surface to its points, evenly thinned to at most so many.
+    pub fn fit(&mut self, scene: &Scene, most: usize) -> Option<()> {
+        let step = self.members.len().div_ceil(most).max(1);
+        let points: Vec<Vector> =
+            self.members.iter().step_by(step).map(|&point| scene.points[point as usize]).collect();
+        let fitted = refine(self.primitive, &points, extent(&points))?;
+        let (count, parameters) = (points.len() as f64, fitted.primitive.kind.parameters() as f64);
+        self.primitive = fitted.primitive;
+        self.deviation = fitted.rms * (count / (count - parameters)).sqrt();
+        Some(())
+    }
+
+    /// Distance from the surface up to which points belong to it.
+    pub fn tolerance(&self, noise: f64, floor: f64) -> f64 {
+        NEAR * self.deviation.max(0.3 * noise).min(ROUGHEST * noise) + floor
+    }
+}
+
+/// How far points are spread: the diagonal of their box.
+fn extent(points: &[Vector]) -> f64 {
+    let far = Vector::repeat(f64::INFINITY);
+    let (low, high) = points.iter().fold((far, -far), |(low, high), p| (low.inf(p), high.sup(p)));
+    (high - low).norm()
+}

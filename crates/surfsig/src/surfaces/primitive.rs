@@ -1,0 +1,247 @@
+//! The surfaces that are looked for, and how far points are from them.
+
+use nalgebra::Vector3;
+
+/// A point or a direction.
+pub(super) type Vector = Vector3<f64>;
+
+/// Most parameters that a surface has.
+pub(super) const MOST_PARAMETERS: usize = 7;
+
+/// What a surface is.
+///
+/// ```
+/// assert_eq!(surfsig::SurfaceKind::Torus.name(), "torus");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum SurfaceKind {
+    /// A plane.
+    Plane = 0,
+    /// A sphere.
+    Sphere = 1,
+    /// A circular cylinder.
+    Cylinder = 2,
+    /// A circular cone, one nappe of it.
+    Cone = 3,
+    /// A torus.
+    Torus = 4,
+}
+
+impl SurfaceKind {
+    /// All of them, the simplest first.
+    pub const ALL: [Self; 5] = [Self::Plane, Self::Sphere, Self::Cylinder, Self::Cone, Self::Torus];
+
+    /// The name, in lower case.
+    pub fn name(self) -> &'static str {
+        ["plane", "sphere", "cylinder", "cone", "torus"][self as usize]
+    }
+
+    /// Number of parameters.
+    pub fn parameters(self) -> usize {
+        [3, 4, 5, 6, 7][self as usize]
+    }
+}
+
+/// A surface without a boundary.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Primitive {
+    pub kind: SurfaceKind,
+    /// On the plane or the axis; the centre of a sphere or torus.
+    pub point: Vector,
+    /// Unit: a plane's normal, the axis of all others but the sphere.
+    pub axis: Vector,
+    /// Of a sphere or cylinder; of a cone at `point`; of a torus's tube.
+    pub radius: f64,
+    /// Of a torus: from the axis to the middle of the tube.
+    pub major_radius: f64,
+    /// Half the angle at a cone's apex; the radius grows along the axis.
+    pub half_angle: f64,
+}
+
+/// A surface and two directions across its axis, in which its parameters are counted.
+///
+/// In this order: a plane's offset, and the tilts of its normal; a sphere's centre and radius; of all surfaces of
+/// revolution the shifts of the axis, its tilts, and then the radius (cylinder), the radius and the half angle
+/// (cone), the shift along the axis, the major radius and the tube's radius (torus).
+pub(super) struct Chart {
+    pub primitive: Primitive,
+    across: [Vector; 2],
+    sine: f64,
+    cosine: f64,
+}
+
+impl Primitive {
+    pub fn chart(&self) -> Chart {
+        let smallest = self.axis.iamin();
+        let first = self.axis.cross(&Vector::ith(smallest, 1.0)).normalize();
+        let (sine, cosine) = self.half_angle.sin_cos();
+        Chart { primitive: *self, across: [first, self.axis.cross(&first)], sine, cosine }
+    }
+
+    /// Whether it is of its kind at all, for points that extend so far.
+    pub fn is_valid(&self, extent: f64) -> bool {
+        let finite = self.point.iter().chain(self.axis.iter()).all(|c| c.is_finite());
+        let radius = self.radius > 1e-6 * extent && self.radius < 100.0 * extent;
+        finite
+            && match self.kind {
+                SurfaceKind::Plane => true,
+                SurfaceKind::Sphere | SurfaceKind::Cylinder => radius,
+                SurfaceKind::Cone => {
+                    self.radius.abs() < 100.0 * extent && (0.01..1.55).contains(&self.half_angle)
+                }
+                SurfaceKind::Torus => {
+                    radius && self.major_radius > self.radius && self.major_radius < 100.0 * extent
+                }
+            }
+    }
+}
+
+impl Chart {
+    /// Signed distance of a point.
+    pub fn distance(&self, point: &Vector) -> f64 {
+        let p = &self.primitive;
+        let from = point - p.point;
+        match p.kind {
+            SurfaceKind::Plane => from.dot(&p.axis),
+            SurfaceKind::Sphere => from.norm() - p.radius,
+            _ => {
+                let height = from.dot(&p.axis);
+                let away = (from - height * p.axis).norm();
+                match p.kind {
+                    SurfaceKind::Cylinder => away - p.radius,
+                    SurfaceKind::Cone => (away - p.radius) * self.cosine - height * self.sine,
+                    _ => (away - p.major_radius).hypot(height) - p.radius,
+                }
+            }
+        }
+    }
+
+    /// Signed distance of a point, and its derivatives by the parameters.
+    pub fn distance_and_derivatives(&self, point: &Vector) -> (f64, [f64; MOST_PARAMETERS]) {
+        let p = &self.primitive;
+        let from = point - p.point;
+        let along = self.across.map(|direction| from.dot(&direction));
+        let mut by = [0.0; MOST_PARAMETERS];
+        if p.kind == SurfaceKind::Plane {
+            by[..3].copy_from_slice(&[-1.0, along[0], along[1]]);
+            return (from.dot(&p.axis), by);
+        }
+        if p.kind == SurfaceKind::Sphere {
+            let length = from.norm();
+            let direction = from / length.max(f64::MIN_POSITIVE);
+            by[..4].copy_from_slice(&[-direction.x, -direction.y, -direction.z, -1.0]);
+            return (length - p.radius, by);
+        }
+        let height = from.dot(&p.axis);
+        let away = along[0].hypot(along[1]);
+        let outward = along.map(|a| a / away.max(f64::MIN_POSITIVE));
+        // The distance, and its derivatives by the distance from the axis and by the height.
+        let (distance, by_away, by_height) = match p.kind {
+            SurfaceKind::Cylinder => (away - p.radius, 1.0, 0.0),
+            SurfaceKind::Cone => {
+                ((away - p.radius) * self.cosine - height * self.sine, self.cosine, -self.sine)
+            }
+            _ => {
+                let (across, up) = (away - p.major_radius, height);
+                let length = across.hypot(up).max(f64::MIN_POSITIVE);
+                (length - p.radius, across / length, up / length)
+            }
+        };
+        for i in 0..2 {
+            by[i] = -by_away * outward[i];
+            by[2 + i] = by_height * along[i] - by_away * height * outward[i];
+        }
+        match p.kind {
+            SurfaceKind::Cylinder => by[4] = -1.0,
+            SurfaceKind::Cone => {
+                by[4] = -self.cosine;
+                by[5] = -(away - p.radius) * self.sine - height * self.cosine;
+            }
+            _ => (by[4], by[5], by[6]) = (-by_height, -by_away, -1.0),
+        }
+        (distance, by)
+    }
+
+    /// The surface with its parameters changed.
+    pub fn moved(&self, step: &[f64]) -> Primitive {
+        let mut p = self.primitive;
+        let [first, second] = self.across;
+        match p.kind {
+            SurfaceKind::Plane => {
+                p.point += step[0] * p.axis;
+                p.axis = (p.axis + step[1] * first + step[2] * second).normalize();
+            }
+            SurfaceKind::Sphere => {
+                p.point += Vector::new(step[0], step[1], step[2]);
+                p.radius += step[3];
+            }
+            kind => {
+                p.point += step[0] * first + step[1] * second;
+                if kind == SurfaceKind::Torus {
+                    p.point += step[4] * p.axis;
+                    p.major_radius += step[5];
+                    p.radius += step[6];
+                } else {
+                    p.radius += step[4];
+                    p.half_angle += step.get(5).copied().unwrap_or(0.0);
+                }
+                p.axis = (p.axis + step[2] * first + step[3] * second).normalize();
+            }
+        }
+        p
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn examples() -> [Primitive; 5] {
+        let axis = Vector::new(0.36, -0.48, 0.8);
+        let point = Vector::new(0.3, 0.2, -0.5);
+        SurfaceKind::ALL.map(|kind| Primitive {
+            kind,
+            point,
+            axis,
+            radius: 0.4,
+            major_radius: if kind == SurfaceKind::Torus { 1.3 } else { 0.0 },
+            half_angle: if kind == SurfaceKind::Cone { 0.5 } else { 0.0 },
+        })
+    }
+
+    #[test]
+    fn derivatives_are_those_of_small_changes() {
+        for primitive in examples() {
+            let chart = primitive.chart();
+            for place in [[0.9, 0.1, 0.2], [-0.7, 0.8, 0.4], [0.2, -1.1, 0.3]].map(Vector::from) {
+                let (distance, by) = chart.distance_and_derivatives(&place);
+                assert!((distance - chart.distance(&place)).abs() < 1e-14);
+                for parameter in 0..primitive.kind.parameters() {
+                    let changed = |by: f64| {
+                        let mut step = [0.0; MOST_PARAMETERS];
+                        step[parameter] = by;
+                        chart.moved(&step[..primitive.kind.parameters()]).chart().distance(&place)
+                    };
+                    let slope = (changed(1e-5) - changed(-1e-5)) / 2e-5;
+                    assert!(
+                        (slope - by[parameter]).abs() < 1e-8,
+                        "{:?} {parameter}: {slope} {by:?}",
+                        primitive.kind
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn distances_are_those_of_formulas() {
+        let [_, _, cylinder, cone, torus] = examples().map(|p| p.chart());
+        // Straight out from the axis, at the point's height.
+        let out = Vector::new(0.8, 0.6, 0.0);
+        let at = |away: f64| Vector::new(0.3, 0.2, -0.5) + away * out;
+        assert!((cylinder.distance(&at(1.0)) - 0.6).abs() < 1e-14);
+        assert!((cone.distance(&at(1.0)) - 0.6 * 0.5_f64.cos()).abs() < 1e-14);
+        assert!((torus.distance(&at(1.0)) - (0.3 - 0.4)).abs() < 1e-14);
+    }
+}
