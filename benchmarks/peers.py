@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import venv
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -86,22 +87,22 @@ PEERS = (
 )
 
 
-def run_json(command: Command, threads: int) -> dict[str, Any]:
+def run_json(command: Command, threads: int, seconds: int = TIME_LIMIT_SECONDS) -> dict[str, Any]:
     """Run a program that prints one JSON line, with OpenMP held to `threads`, and return what it printed.
 
     Raises
     ------
     PeerUnavailable
-        When it fails or does not end within half an hour.
+        When it fails or does not end within so many seconds.
     """
     environment = os.environ | {"OMP_NUM_THREADS": str(threads), "PYTHONWARNINGS": "ignore"}
     try:
         run = subprocess.run(
-            command, capture_output=True, text=True, timeout=TIME_LIMIT_SECONDS, env=environment, check=True
+            command, capture_output=True, text=True, timeout=seconds, env=environment, check=True
         )
         answer: dict[str, Any] = json.loads(run.stdout.splitlines()[-1])
     except subprocess.TimeoutExpired:
-        raise PeerUnavailable(f"not finished within {TIME_LIMIT_SECONDS} s") from None
+        raise PeerUnavailable(f"not finished within {seconds} s") from None
     except subprocess.CalledProcessError as error:
         raise PeerUnavailable(last_line(error.stderr) or f"exit status {error.returncode}") from None
     except (OSError, IndexError, ValueError) as error:
@@ -123,6 +124,18 @@ def python_program() -> Command:
     PeerUnavailable
         When their environment cannot be made.
     """
+    lines = (HERE / "requirements-peers.txt").read_text().splitlines()
+    return [peer_python(line for line in lines if not line.startswith("#")), HERE / "peers_python.py"]
+
+
+def peer_python(requirements: Iterable[str]) -> Path:
+    """Return the Python of the peers' environment and install what is missing of some requirements.
+
+    Raises
+    ------
+    PeerUnavailable
+        When the environment cannot be made.
+    """
     python = ENVIRONMENT / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     if not python.exists():
         try:
@@ -130,14 +143,12 @@ def python_program() -> Command:
         except subprocess.CalledProcessError as error:
             raise PeerUnavailable(f"cannot make {ENVIRONMENT.name}: {error}") from None
         (ENVIRONMENT / ".gitignore").write_text("*\n")
-    for requirement in (HERE / "requirements-peers.txt").read_text().splitlines():
-        if requirement.startswith("#"):
-            continue
+    for requirement in requirements:
         pip: Command = [python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", requirement]
         run = subprocess.run(pip, capture_output=True, text=True)
         if run.returncode:
             print(f"{requirement} is left out: {last_line(run.stderr)}", file=sys.stderr)
-    return [python, HERE / "peers_python.py"]
+    return python
 
 
 def cpp_program() -> Command:
@@ -148,28 +159,30 @@ def cpp_program() -> Command:
     PeerUnavailable
         When the compiler or the headers are missing, or it does not compile.
     """
+    libraries = [f"-lpcl_{part}" for part in ("features", "search", "kdtree", "octree", "common")]
+    source = HERE / "peers_pcl_cgal.cpp"
+    return compile_program(source, ["-fopenmp", *include_flags()], [*libraries, "-lgmp", "-lmpfr"])
+
+
+def compile_program(source: Path, flags: Sequence[str], libraries: Sequence[str]) -> Command:
+    """Return the command of a C++ program, compiling it where it is older than its source.
+
+    Raises
+    ------
+    PeerUnavailable
+        When there is no compiler, or it does not compile.
+    """
     candidates = (os.environ.get("CXX", ""), "g++", "clang++")
     compiler = next(filter(None, map(shutil.which, candidates)), None)
     if compiler is None:
         raise PeerUnavailable("no C++ compiler")
-    source, program = HERE / "peers_pcl_cgal.cpp", BUILD / "peers_pcl_cgal"
+    program = BUILD / source.stem
     if program.exists() and program.stat().st_mtime > source.stat().st_mtime:
         return [program]
     BUILD.mkdir(parents=True, exist_ok=True)
     # Not -march=native: the packaged PCL is built without AVX, and Eigen would align its types differently.
-    command: Command = [
-        compiler,
-        "-O3",
-        "-DNDEBUG",
-        "-fopenmp",
-        "-std=c++17",
-        *include_flags(),
-        source,
-        "-o",
-        program,
-    ]
-    libraries = [f"-lpcl_{part}" for part in ("features", "search", "kdtree", "octree", "common")]
-    run = subprocess.run([*command, *libraries, "-lgmp", "-lmpfr"], capture_output=True, text=True)
+    command: Command = [compiler, "-O3", "-DNDEBUG", "-std=c++17", *flags, source, "-o", program, *libraries]
+    run = subprocess.run(command, capture_output=True, text=True)
     if run.returncode:
         errors = [line for line in run.stderr.splitlines() if "error" in line]
         raise PeerUnavailable(errors[0] if errors else last_line(run.stderr))
