@@ -12,7 +12,7 @@ import shutil
 import subprocess
 import sys
 import venv
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -124,12 +124,11 @@ def python_program() -> Command:
     PeerUnavailable
         When their environment cannot be made.
     """
-    lines = (HERE / "requirements-peers.txt").read_text().splitlines()
-    return [peer_python(line for line in lines if not line.startswith("#")), HERE / "peers_python.py"]
+    return [peer_python(), HERE / "peers_python.py"]
 
 
-def peer_python(requirements: Iterable[str]) -> Path:
-    """Return the Python of the peers' environment and install what is missing of some requirements.
+def peer_python(name: str = "") -> Path:
+    """Return the Python of the peers' environment and install what is missing: all, or one package by name.
 
     Raises
     ------
@@ -143,7 +142,9 @@ def peer_python(requirements: Iterable[str]) -> Path:
         except subprocess.CalledProcessError as error:
             raise PeerUnavailable(f"cannot make {ENVIRONMENT.name}: {error}") from None
         (ENVIRONMENT / ".gitignore").write_text("*\n")
-    for requirement in requirements:
+    for requirement in (HERE / "requirements-peers.txt").read_text().splitlines():
+        if not requirement.startswith(name) or requirement.startswith("#"):
+            continue
         pip: Command = [python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", requirement]
         run = subprocess.run(pip, capture_output=True, text=True)
         if run.returncode:

@@ -112,7 +112,7 @@ def cgal_program() -> Command:
 @functools.cache
 def pyransac3d_program() -> Command:
     """Return the command of the program that runs pyransac3d, in the environment of the peers."""
-    return [peer_python(["pyransac3d>=0.7"]), HERE / "ransac_pyransac3d.py"]
+    return [peer_python("pyransac3d"), HERE / "ransac_pyransac3d.py"]
 
 
 TUNED = RansacSettings(0.001, 4, 0.003, 0.8, cones_and_tori=False)
