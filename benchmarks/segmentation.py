@@ -53,25 +53,28 @@ def run_method(
 def measure(plan: argparse.Namespace, console: Console) -> Results:
     """Run all methods on all clouds."""
     models, tables = read_models(plan.data), read_tables(plan.data)
-    if not models and not tables:
-        sys.exit(f"{plan.data} has neither clouds of Fit4CAD nor labelled_tables")
     if plan.only:
         models = [model for model in models if model.name in plan.only]
         tables = [table for table in tables if table.name in plan.only]
+    if not models and not tables:
+        sys.exit(f"{plan.data} has no cloud that is asked for: of Fit4CAD, or in labelled_tables")
     methods = [method for method in METHODS if method.name in plan.methods]
     results: Results = {
         "machine": describe_machine(),
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
         "versions": own_versions() | peer_versions(plan.methods),
         "seed": SEED,
+        "clouds": len(models),
         "models": {},
+        "tables": [],
     }
     with Progress(console=console, transient=True) as progress:
-        for noise in plan.noise:
+        for noise in plan.noise if models else ():
             noisy = [with_noise(model, noise, SEED) for model in models]
             what = f"noise {noise:g}"
             results["models"][str(noise)] = [run_method(each, noisy, progress, what) for each in methods]
-        results["tables"] = [run_method(each, tables, progress, "tables") for each in methods]
+        if tables:
+            results["tables"] = [run_method(each, tables, progress, "tables") for each in methods]
     return results
 
 
@@ -127,11 +130,10 @@ def markdown(results: Results, detail: bool) -> str:
     """Return all tables and notes as Markdown."""
     parts = []
     for noise, entries in results["models"].items():
-        count = len(entries[0]["clouds"]) or max(len(entry["clouds"]) for entry in entries)
         title = "without noise" if float(noise) == 0 else f"with noise of {float(noise):.1%} of the diagonal"
-        parts.append(f"### Fit4CAD, {count} clouds, {title}")
+        parts.append(f"### Fit4CAD, {title} (clouds: {results['clouds']})")
         parts.append(markdown_table(MODEL_COLUMNS, rows(entries, MODEL_COLUMNS, detail)))
-    if any(entry["clouds"] for entry in results["tables"]):
+    if results["tables"]:
         parts.append("### Labelled tables")
         parts.append(markdown_table(TABLE_COLUMNS, rows(results["tables"], TABLE_COLUMNS, detail)))
     parts.append("\n".join(f"- {line}" for line in notes(results)))
