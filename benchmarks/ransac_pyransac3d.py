@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 THRESHOLD = 0.001  # of the diagonal
-LEAST_POINTS = 0.003  # of all points
-ROUNDS = 1000
+LEAST_POINTS = 0.01  # of all points
+ROUNDS = 300
 
 
 def main() -> None:

@@ -19,7 +19,7 @@ from segmentation_score import Found
 
 import surfsig
 
-TIME_LIMIT_SECONDS = 300
+TIME_LIMIT_SECONDS = 120
 SEED = 1
 
 
