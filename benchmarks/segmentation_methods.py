@@ -21,6 +21,7 @@ import surfsig
 
 TIME_LIMIT_SECONDS = 120
 SEED = 1
+PYRANSAC3D_MOST_POINTS = 50_000
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,15 @@ def cgal_ransac(settings: RansacSettings) -> Callable[[surfsig.PointCloud], tupl
 
 
 def pyransac3d(cloud: surfsig.PointCloud) -> tuple[Found, float]:
-    """Find surfaces with pyransac3d, which fits one model at a time."""
+    """Find surfaces with pyransac3d, which fits one model at a time.
+
+    Raises
+    ------
+    PeerUnavailable
+        When there are so many points that it would take many minutes.
+    """
+    if len(cloud.offsets) > PYRANSAC3D_MOST_POINTS:
+        raise PeerUnavailable(f"takes minutes for a cloud of more than {PYRANSAC3D_MOST_POINTS:,} points")
     return find_outside(pyransac3d_program(), cloud, [str(SEED)])
 
 
