@@ -10,11 +10,11 @@ PREFIX ?= /usr/local
 # What the compiled module is made from; a change of any rebuilds it.
 SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help demo test lint format bench bench-reading bench-error fuzz docs tour wheel check-wheel header install-c clean build
+.PHONY: help demo test lint format bench bench-reading bench-error bench-segmentation fuzz docs tour wheel check-wheel header install-c clean build
 .DEFAULT_GOAL := help
 
 help: ## Say what there is to make
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-18s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 demo: build ## Run the main job and draw it into demo/
 	$(BIN)/python examples/demo.py $(OUT)
@@ -46,6 +46,8 @@ bench-reading: build ## Time the reading of files, and write that table of BENCH
 
 bench-error: build ## Measure the error of curvature beside CGAL's jets, and write BENCHMARKS.md and docs/fits.md
 	$(BIN)/python benchmarks/curvature_error.py --write
+bench-segmentation: build ## Score the surfaces found in clouds of known ones, and write that part of BENCHMARKS.md
+	$(BIN)/python benchmarks/segmentation.py --write
 
 fuzz: build ## Read damaged files of all formats: make fuzz COUNT=100000
 	$(BIN)/python fuzz/mutate.py --count $(COUNT)

@@ -91,22 +91,22 @@ PEERS = (
 )
 
 
-def run_json(command: Command, threads: int) -> dict[str, Any]:
+def run_json(command: Command, threads: int, seconds: int = TIME_LIMIT_SECONDS) -> dict[str, Any]:
     """Run a program that prints one JSON line, with OpenMP held to `threads`, and return what it printed.
 
     Raises
     ------
     PeerUnavailable
-        When it fails or does not end within half an hour.
+        When it fails or does not end within so many seconds.
     """
     environment = os.environ | {"OMP_NUM_THREADS": str(threads), "PYTHONWARNINGS": "ignore"}
     try:
         run = subprocess.run(
-            command, capture_output=True, text=True, timeout=TIME_LIMIT_SECONDS, env=environment, check=True
+            command, capture_output=True, text=True, timeout=seconds, env=environment, check=True
         )
         answer: dict[str, Any] = json.loads(run.stdout.splitlines()[-1])
     except subprocess.TimeoutExpired:
-        raise PeerUnavailable(f"not finished within {TIME_LIMIT_SECONDS} s") from None
+        raise PeerUnavailable(f"not finished within {seconds} s") from None
     except subprocess.CalledProcessError as error:
         raise PeerUnavailable(last_line(error.stderr) or f"exit status {error.returncode}") from None
     except (OSError, IndexError, ValueError) as error:
@@ -128,6 +128,17 @@ def python_program() -> Command:
     PeerUnavailable
         When their environment cannot be made.
     """
+    return [peer_python(), HERE / "peers_python.py"]
+
+
+def peer_python(name: str = "") -> Path:
+    """Return the Python of the peers' environment and install what is missing: all, or one package by name.
+
+    Raises
+    ------
+    PeerUnavailable
+        When the environment cannot be made.
+    """
     python = ENVIRONMENT / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     if not python.exists():
         try:
@@ -136,13 +147,13 @@ def python_program() -> Command:
             raise PeerUnavailable(f"cannot make {ENVIRONMENT.name}: {error}") from None
         (ENVIRONMENT / ".gitignore").write_text("*\n")
     for requirement in (HERE / "requirements-peers.txt").read_text().splitlines():
-        if requirement.startswith("#"):
+        if not requirement.startswith(name) or requirement.startswith("#"):
             continue
         pip: Command = [python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", requirement]
         run = subprocess.run(pip, capture_output=True, text=True)
         if run.returncode:
             print(f"{requirement} is left out: {last_line(run.stderr)}", file=sys.stderr)
-    return [python, HERE / "peers_python.py"]
+    return python
 
 
 def cpp_program() -> Command:

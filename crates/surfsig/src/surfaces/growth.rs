@@ -19,7 +19,7 @@ const NEAR: f64 = 3.5;
 
 /// What a surface's standard deviation may be, in units of the noise of its points' surroundings: neighbouring points
 /// of a scan may err together.
-const ROUGHEST: f64 = 3.0;
+const ROUGHEST: f64 = 1.3;
 
 /// Rounds of growing and fitting.
 const MAX_ROUNDS: usize = 30;
