@@ -6,6 +6,7 @@ python benchmarks/auto_radius.py
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,13 +14,13 @@ import numpy.typing as npt
 import surfsig
 
 Array = npt.NDArray[np.float64]
-Surface = tuple[Array, Array, Array, npt.NDArray[np.bool_]]
+Surface = tuple[Array, Array, Array, npt.NDArray[Any]]
 SEED, NOISES = 3, (0.02, 0.1, 0.3)
 RADII = [2 ** (i / 2) for i in range(2, 11)]
 
 
 def sphere(rng: np.random.Generator) -> Surface:
-    """Make points of a half sphere of radius 30, their normals, mean curvature, and which are not at the rim."""
+    """Make points of a half sphere of radius 30, normals, mean curvature, and which are not at the rim."""
     z, turn = rng.uniform(0, 1, 24_000), rng.uniform(0, 2 * np.pi, 24_000)
     normals = np.column_stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z])
     return 30 * normals, normals, np.full(len(z), 1 / 30), z > 0.4

@@ -15,11 +15,14 @@ const SAMPLE: usize = 1500;
 const SAMPLE_OF_KIND: usize = 400;
 
 /// Standard deviations from the surface at which points belong to it.
-const NEAR: f64 = 3.5;
+const NEAR: f64 = 3.0;
 
 /// What a surface's standard deviation may be, in units of the noise of its points' surroundings: neighbouring points
 /// of a scan may err together.
-const ROUGHEST: f64 = 1.3;
+const ROUGHEST: f64 = 1.15;
+
+/// A surface whose points stray more, in the same units, is none.
+const ROUGH: f64 = 1.4;
 
 /// Rounds of growing and fitting.
 const MAX_ROUNDS: usize = 30;
@@ -35,6 +38,13 @@ const AS_GOOD: f64 = 1.6;
 
 /// A seed's first points need no surface with more parameters where one has this much of the noise.
 const ENOUGH: f64 = 1.3;
+
+/// Cosine of the angle between the surface's normal and that of a point's surroundings up to which the point may
+/// belong to it, ...
+const ALONG: f64 = 0.9;
+
+/// ... unless noise is below so many floors: then distances tell all, and normals at edges nothing.
+const NOISELESS: f64 = 20.0;
 
 /// Evidence, in units of the logarithm of likelihood, for a parameter more.
 const EVIDENCE: f64 = 10.0;
@@ -125,7 +135,8 @@ impl Grower<'_> {
             let most = 2 * before;
             let tolerance = region.tolerance(noise, scene.floor);
             let chart = region.primitive.chart();
-            region.members = scene.reached(&chart, tolerance, &region.members, most, self.seen);
+            let turned = if noise > NOISELESS * scene.floor { ALONG } else { -1.0 };
+            region.members = scene.reached(&chart, tolerance, turned, &region.members, most, self.seen);
             let after = region.members.len();
             if after < FIRST / 2 {
                 return None;
@@ -136,7 +147,7 @@ impl Grower<'_> {
         }
         region.members = scene.largest_part(&region.members, self.seen, self.inside);
         region.fit(scene, SAMPLE)?;
-        Some(region)
+        (region.deviation <= ROUGH * noise + scene.floor).then_some(region)
     }
 }
 

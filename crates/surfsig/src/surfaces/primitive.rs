@@ -117,6 +117,25 @@ impl Chart {
         }
     }
 
+    /// The surface's normal next to a point.
+    pub fn normal(&self, point: &Vector) -> Vector {
+        let p = &self.primitive;
+        let from = point - p.point;
+        if p.kind == SurfaceKind::Plane {
+            return p.axis;
+        }
+        if p.kind == SurfaceKind::Sphere {
+            return from.normalize();
+        }
+        let height = from.dot(&p.axis);
+        let outward = (from - height * p.axis).normalize();
+        match p.kind {
+            SurfaceKind::Cylinder => outward,
+            SurfaceKind::Cone => self.cosine * outward - self.sine * p.axis,
+            _ => (from - p.major_radius * outward).normalize(),
+        }
+    }
+
     /// Signed distance of a point, and its derivatives by the parameters.
     pub fn distance_and_derivatives(&self, point: &Vector) -> (f64, [f64; MOST_PARAMETERS]) {
         let p = &self.primitive;

@@ -95,18 +95,23 @@ impl Scene {
         found
     }
 
-    /// Those of some points that are near to a surface, and the unlabelled points that hang together with them there:
+    /// Those of some points that are near to a surface and lie along it (a cosine), and the unlabelled points that hang together with them there:
     /// at most so many.
     pub fn reached(
         &self,
         chart: &Chart,
         tolerance: f64,
+        along: f64,
         from: &[u32],
         most: usize,
         seen: &mut Stamps,
     ) -> Vec<u32> {
         seen.clear();
-        let near = |point: u32| chart.distance(&self.points[point as usize]).abs() <= tolerance;
+        let near = |point: u32| {
+            let place = &self.points[point as usize];
+            chart.distance(place).abs() <= tolerance
+                && (along <= 0.0 || chart.normal(place).dot(&self.normals[point as usize]).abs() >= along)
+        };
         let mut found: Vec<u32> =
             from.iter().copied().filter(|&point| near(point) && seen.set(point)).collect();
         let mut next = 0;
