@@ -50,11 +50,14 @@ const NOISELESS: f64 = 20.0;
 const EVIDENCE: f64 = 10.0;
 
 /// A surface, and the points that belong to it.
+#[derive(Clone)]
 pub(super) struct Region {
     pub primitive: Primitive,
     pub members: Vec<u32>,
     /// Standard deviation of its points' distances.
     pub deviation: f64,
+    /// The noise around its seed.
+    pub noise: f64,
 }
 
 /// What grows surfaces.
@@ -77,7 +80,7 @@ impl Grower<'_> {
         }
         for start in self.first_surfaces(&first, noise) {
             if let Some(region) = self.grow(start, &first, noise)
-                && best.as_ref().is_none_or(|best| region.is_better_than(best))
+                && best.as_ref().is_none_or(|best| region.is_better_than(best, self.scene))
             {
                 best = Some(region);
             }
@@ -89,12 +92,12 @@ impl Grower<'_> {
             }
             if let Some(start) = self.more_complex(kind, simpler)
                 && let Some(region) = self.grow(start, &simpler.members, noise)
-                && region.is_better_than(simpler)
+                && region.is_better_than(simpler, self.scene)
             {
                 best = Some(region);
             }
         }
-        (best.filter(|region| region.members.len() >= self.fewest), first)
+        (best.filter(|region| region.is_smooth(self.scene) && region.members.len() >= self.fewest), first)
     }
 
     /// The simplest surface that explains a seed's first points as well as any.
@@ -128,12 +131,12 @@ impl Grower<'_> {
     /// Grows a surface from some points: fits, takes the near points that hang together, and fits again.
     fn grow(&mut self, start: Primitive, from: &[u32], noise: f64) -> Option<Region> {
         let scene = self.scene;
-        let mut region = Region { primitive: start, members: from.to_vec(), deviation: 0.0 };
+        let mut region = Region { primitive: start, members: from.to_vec(), deviation: 0.0, noise };
         for _ in 0..MAX_ROUNDS {
             let before = region.members.len();
             region.fit(scene, SAMPLE)?;
             let most = 2 * before;
-            let tolerance = region.tolerance(noise, scene.floor);
+            let tolerance = region.tolerance(scene);
             let chart = region.primitive.chart();
             let turned = if noise > NOISELESS * scene.floor { ALONG } else { -1.0 };
             region.members = scene.reached(&chart, tolerance, turned, &region.members, most, self.seen);
@@ -147,7 +150,7 @@ impl Grower<'_> {
         }
         region.members = scene.largest_part(&region.members, self.seen, self.inside);
         region.fit(scene, SAMPLE)?;
-        (region.deviation <= ROUGH * noise + scene.floor).then_some(region)
+        Some(region)
     }
 }
 
@@ -172,10 +175,15 @@ fn fitted(
 }
 
 impl Region {
-    /// Whether it has more points than another, or explains about as many much better.
-    fn is_better_than(&self, other: &Self) -> bool {
+    /// Whether it is smooth and another is not, or has more points, or explains about as many much better.
+    fn is_better_than(&self, other: &Self, scene: &Scene) -> bool {
         let (size, old) = (self.members.len() as f64, other.members.len() as f64);
-        size >= MORE * old || size >= old / MORE && self.deviation.powi(2) < BETTER * other.deviation.powi(2)
+        let closer = self.deviation.powi(2) < BETTER * other.deviation.powi(2);
+        match (self.is_smooth(scene), other.is_smooth(scene)) {
+            (true, false) => size >= 0.5 * old,
+            (false, true) => false,
+            _ => size >= MORE * old || size >= old / MORE && closer,
+        }
     }
 
     /// Fits the surface to its points, evenly thinned to at most so many.
@@ -191,8 +199,13 @@ impl Region {
     }
 
     /// Distance from the surface up to which points belong to it.
-    pub fn tolerance(&self, noise: f64, floor: f64) -> f64 {
-        NEAR * self.deviation.max(0.3 * noise).min(ROUGHEST * noise) + floor
+    pub fn tolerance(&self, scene: &Scene) -> f64 {
+        NEAR * self.deviation.max(0.3 * self.noise).min(ROUGHEST * self.noise) + scene.floor
+    }
+
+    /// Whether its points stray no more than noise does.
+    pub fn is_smooth(&self, scene: &Scene) -> bool {
+        self.deviation <= ROUGH * self.noise + scene.floor
     }
 }
 

@@ -1,13 +1,15 @@
 //! Which parts of a scan are planes, spheres, cylinders, cones and tori.
 //!
 //! [`scene`] knows each point's neighbours, normal and noise; [`start`] reads a surface off points and normals,
-//! [`least_squares`] fits it by orthogonal distance, [`growth`] lets it grow.
+//! [`least_squares`] fits it by orthogonal distance, [`growth`] lets it grow, [`settling`] joins what is one and shares
+//! out what lies between.
 
 mod graph;
 mod growth;
 mod least_squares;
 mod primitive;
 mod scene;
+mod settling;
 mod start;
 
 pub use primitive::SurfaceKind;
@@ -95,7 +97,9 @@ pub fn find_surfaces(
         let fewest = options.fewest.unwrap_or_else(|| (scene.points.len() / 500).clamp(20, 1000));
         let all = SurfaceKind::ALL;
         let kinds = if options.kinds.is_empty() { &all[..] } else { &options.kinds };
-        let regions = regions(&mut scene, kinds, fewest, monitor)?;
+        let mut regions = regions(&mut scene, kinds, fewest, monitor)?;
+        settling::merge(&mut scene, &mut regions);
+        settling::assign(&mut scene, &mut regions);
         Ok(assembled(cloud.len(), &scene, regions))
     })?
 }
