@@ -38,13 +38,13 @@ def main() -> None:
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
         "versions": own_versions(),
     }
-    sparse, dense = bumpy_square(TARGET_POINTS), bumpy_square(SCALING_POINTS)
-    clouds = (sparse, dense, bumpy_tenth(SCALING_POINTS))
+    sparse = bumpy_square(TARGET_POINTS)
+    clouds = (sparse, bumpy_square(SCALING_POINTS), bumpy_tenth(SCALING_POINTS))
     parts = [
         table("cloud", [(f"{len(c):,} points", one_radius(c)) for c in clouds]),
         table("fit", kinds_of_fit(sparse)),
         table("radii", several_radii(sparse)),
-        table("radii", several_radii(dense, choose=False)),
+        table("radii", several_radii(bumpy_tenth(TARGET_POINTS))),
         "\n".join(f"- {note}" for note in measured_on(facts)),
     ]
     text = "\n\n".join(parts)
@@ -69,20 +69,23 @@ def kinds_of_fit(cloud: NDArray[np.float32]) -> list[tuple[str, Job]]:
     ]
 
 
-def several_radii(cloud: NDArray[np.float32], *, choose: bool = True) -> list[tuple[str, Job]]:
-    """Return the extraction at the largest radius, at five in one pass, and where each point chooses."""
+def several_radii(cloud: NDArray[np.float32]) -> list[tuple[str, Job]]:
+    """Return the extraction at the largest radius, at five of them, and where each point chooses its own."""
 
     def one_pass(shares: tuple[float, ...]) -> surfsig.Extraction:
         return surfsig.extract_radii(cloud, [share * TARGET_RADIUS for share in shares])[-1]
 
-    jobs: list[tuple[str, Job]] = [
+    def one_by_one(shares: tuple[float, ...]) -> surfsig.Extraction:
+        return [surfsig.extract(cloud, share * TARGET_RADIUS) for share in shares][-1]
+
+    return [
         ("r = 0.02", one_radius(cloud)),
         ("0.6 r, 0.7 r, 0.8 r, 0.9 r, r", lambda: one_pass(CLOSE_RADII)),
+        ("the same, one by one", lambda: one_by_one(CLOSE_RADII)),
         ("r/4, r/2.83, r/2, r/1.41, r", lambda: one_pass(RADII_LADDER)),
+        ("the same, one by one", lambda: one_by_one(RADII_LADDER)),
+        ('"auto"', lambda: surfsig.extract(cloud, "auto")),
     ]
-    if choose:
-        jobs.append(('"auto"', lambda: surfsig.extract(cloud, "auto")))
-    return jobs
 
 
 def table(title: str, jobs: list[tuple[str, Job]]) -> str:
