@@ -30,6 +30,9 @@ const SMALL: usize = 4;
 /// A surface with so many points that strays more than noise does is not the right one, and need not grow further.
 const LARGE: usize = 2000;
 
+/// Extent of a curved surface in units of its radius.
+const LEAST_TURN: f64 = 0.15;
+
 /// Rounds after the growth has ended.
 const MAX_SETTLING: usize = 6;
 
@@ -166,7 +169,7 @@ impl Grower<'_> {
         }
         region.members = scene.largest_part(&region.members, self.seen, self.inside);
         region.fit(scene, SAMPLE)?;
-        Some(region)
+        region.is_bent(scene).then_some(region)
     }
 }
 
@@ -217,6 +220,12 @@ impl Region {
     /// Distance from the surface up to which points belong to it.
     pub fn tolerance(&self, scene: &Scene) -> f64 {
         NEAR * self.deviation.max(0.3 * self.noise).min(ROUGHEST * self.noise) + scene.floor
+    }
+
+    /// Whether it is a plane, or turns enough within its extent to be told from one: no plane is a huge cylinder.
+    fn is_bent(&self, scene: &Scene) -> bool {
+        let (points, _) = scene.sample(&self.members, SAMPLE_OF_KIND);
+        self.primitive.kind == SurfaceKind::Plane || extent(&points) >= LEAST_TURN * self.primitive.radius
     }
 
     /// Whether its points stray no more than noise does.
