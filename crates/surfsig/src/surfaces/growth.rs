@@ -1,6 +1,6 @@
 //! A surface that grows over its neighbours.
 
-use super::least_squares::refine;
+use super::least_squares::{EXACT, Patience, QUICK, refine};
 use super::primitive::{Primitive, SurfaceKind, Vector};
 use super::scene::{Scene, Stamps};
 use super::start::{bent, start};
@@ -36,6 +36,9 @@ const LARGE: usize = 2000;
 /// Extent of a curved surface in units of its radius.
 const LEAST_TURN: f64 = 0.15;
 
+/// Noise of so many floors is none.
+const NOISELESS: f64 = 20.0;
+
 /// Rounds after the growth has ended.
 const MAX_SETTLING: usize = 6;
 
@@ -55,14 +58,21 @@ const AS_GOOD: f64 = 1.6;
 const ENOUGH: f64 = 1.3;
 
 /// Cosine of the angle between the surface's normal and that of a point's surroundings up to which the point may
-/// belong to it, ...
+/// belong to it. Without noise distances tell all, and normals at edges nothing.
 const ALONG: f64 = 0.9;
-
-/// ... unless noise is below so many floors: then distances tell all, and normals at edges nothing.
-const NOISELESS: f64 = 20.0;
 
 /// Evidence, in units of the logarithm of likelihood, for a parameter more.
 const EVIDENCE: f64 = 10.0;
+
+impl Scene {
+    fn is_noiseless(&self, noise: f64) -> bool {
+        noise <= NOISELESS * self.floor
+    }
+
+    fn patience(&self, noise: f64) -> Patience {
+        if self.is_noiseless(noise) { EXACT } else { QUICK }
+    }
+}
 
 /// A surface, and the points that belong to it.
 #[derive(Clone)]
@@ -93,7 +103,7 @@ impl Grower<'_> {
         let noise = self.scene.noise_around(seed, self.seen);
         let mut best: Option<Region> = None;
         // Where no quadric explains a place, none of these surfaces does.
-        let rough = noise > NOISELESS * self.scene.floor && self.scene.noise[seed as usize] > 2.0 * noise;
+        let rough = !self.scene.is_noiseless(noise) && self.scene.noise[seed as usize] > 2.0 * noise;
         if first.len() < self.first / 2 || !noise.is_finite() || rough {
             return Err(first);
         }
@@ -125,7 +135,7 @@ impl Grower<'_> {
         let mut fits: Vec<(Primitive, f64)> = Vec::new();
         for &kind in self.kinds {
             let simpler = fits.iter().map(|(primitive, _)| *primitive).collect::<Vec<_>>();
-            if let Some(fit) = fitted(kind, &points, &normals, &simpler) {
+            if let Some(fit) = fitted(kind, &points, &normals, &simpler, self.scene.patience(noise)) {
                 fits.push(fit);
                 if fit.1 <= ENOUGH * noise {
                     break;
@@ -141,7 +151,8 @@ impl Grower<'_> {
     /// A surface of a kind with more parameters near the points of a simpler one, if it explains them much better.
     fn more_complex(&self, kind: SurfaceKind, simpler: &Region) -> Option<Primitive> {
         let (points, normals) = self.scene.sample(&simpler.members, SAMPLE_OF_KIND);
-        let (primitive, deviation) = fitted(kind, &points, &normals, &[simpler.primitive])?;
+        let (primitive, deviation) =
+            fitted(kind, &points, &normals, &[simpler.primitive], self.scene.patience(simpler.noise))?;
         let more = kind.parameters() - simpler.primitive.kind.parameters();
         let gain = points.len() as f64 * (simpler.deviation.max(1e-300) / deviation.max(1e-300)).ln();
         (gain > EVIDENCE * more as f64).then_some(primitive)
@@ -161,7 +172,7 @@ impl Grower<'_> {
             let most = 2 * before;
             let tolerance = region.tolerance(scene);
             let chart = region.primitive.chart();
-            let along = if noise > NOISELESS * scene.floor { ALONG } else { -1.0 };
+            let along = if scene.is_noiseless(noise) { -1.0 } else { ALONG };
             region.members = scene.reached(&chart, tolerance, along, &region.members, most, self.seen);
             let after = region.members.len();
             if after < FEW {
@@ -185,6 +196,7 @@ fn fitted(
     points: &[Vector],
     normals: &[Vector],
     simpler: &[Primitive],
+    patience: Patience,
 ) -> Option<(Primitive, f64)> {
     let (count, parameters) = (points.len(), kind.parameters());
     if count < parameters + 5 {
@@ -193,7 +205,7 @@ fn fitted(
     let extent = extent(points);
     let starts =
         start(kind, points, normals).into_iter().chain(simpler.iter().flat_map(|p| bent(p, kind, extent)));
-    let fits = starts.filter_map(|start| refine(start, points, extent));
+    let fits = starts.filter_map(|start| refine(start, points, extent, patience));
     let best = fits.min_by(|a, b| a.rms.total_cmp(&b.rms))?;
     Some((best.primitive, best.rms * (count as f64 / (count - parameters) as f64).sqrt()))
 }
@@ -215,7 +227,7 @@ impl Region {
         let step = self.members.len().div_ceil(most).max(1);
         let points: Vec<Vector> =
             self.members.iter().step_by(step).map(|&point| scene.points[point as usize]).collect();
-        let fitted = refine(self.primitive, &points, extent(&points))?;
+        let fitted = refine(self.primitive, &points, extent(&points), scene.patience(self.noise))?;
         let (count, parameters) = (points.len() as f64, fitted.primitive.kind.parameters() as f64);
         self.primitive = fitted.primitive;
         self.deviation = fitted.rms * (count / (count - parameters)).sqrt();

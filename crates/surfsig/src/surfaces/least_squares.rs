@@ -3,11 +3,20 @@
 use super::primitive::{MOST_PARAMETERS, Primitive, Vector};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// Steps after which a fit is given up or taken as it is.
-const MAX_STEPS: usize = 40;
+/// How long a fit is followed.
+#[derive(Clone, Copy)]
+pub(super) struct Patience {
+    /// Steps after which it is taken as it is.
+    steps: usize,
+    /// It has settled where a step gains less than this share of the sum of squares.
+    settled: f64,
+}
 
-/// A fit has settled where a step gains less than this share of the sum of squares.
-const SETTLED: f64 = 1e-5;
+/// Among noise: what is left to gain is less than noise.
+pub(super) const QUICK: Patience = Patience { steps: 30, settled: 1e-4 };
+
+/// Without noise, along the narrow valleys of small patches: to the exact surface.
+pub(super) const EXACT: Patience = Patience { steps: 200, settled: 1e-7 };
 
 /// Distances that are nothing, in units of the points' extent.
 const NOTHING: f64 = 1e-12;
@@ -21,7 +30,7 @@ pub(super) struct Fitted {
 
 /// The nearest surface of the same kind for which the sum of squared distances is least; `None` where there is none,
 /// or the points are fewer than its parameters.
-pub(super) fn refine(start: Primitive, points: &[Vector], extent: f64) -> Option<Fitted> {
+pub(super) fn refine(start: Primitive, points: &[Vector], extent: f64, patience: Patience) -> Option<Fitted> {
     let parameters = start.kind.parameters();
     if points.len() <= parameters || !start.is_valid(extent) {
         return None;
@@ -30,7 +39,7 @@ pub(super) fn refine(start: Primitive, points: &[Vector], extent: f64) -> Option
     let mut primitive = start;
     let (mut normal, mut gradient, mut sum) = equations(&primitive, points);
     let nothing = (NOTHING * extent).powi(2) * points.len() as f64;
-    for _ in 0..MAX_STEPS {
+    for _ in 0..patience.steps {
         if sum <= nothing {
             break;
         }
@@ -52,7 +61,7 @@ pub(super) fn refine(start: Primitive, points: &[Vector], extent: f64) -> Option
             let gain = sum - new_sum;
             (primitive, normal, gradient) = (moved, new_normal, new_gradient);
             damping *= 0.1;
-            let settled = gain <= SETTLED * sum;
+            let settled = gain <= patience.settled * sum;
             sum = new_sum;
             if settled {
                 break;
@@ -121,7 +130,7 @@ mod tests {
             major_radius: 1.4,
             ..truth
         };
-        let fitted = refine(start, &points, 3.0).unwrap();
+        let fitted = refine(start, &points, 3.0, EXACT).unwrap();
         assert!(fitted.rms < 1e-10);
         assert!((fitted.primitive.radius - 0.3).abs() < 1e-9);
         assert!((fitted.primitive.point - truth.point).norm() < 1e-9);
