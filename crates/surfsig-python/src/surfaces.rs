@@ -1,7 +1,7 @@
 //! The surfaces of a scan, for Python.
 
 use crate::extract::{Points, watched};
-use numpy::{IntoPyArray, PyArray1, ToPyArray};
+use numpy::{IntoPyArray, PyArray1, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -47,6 +47,13 @@ pub fn find_surfaces<'py>(
         entry.set_item("half_angle", surface.half_angle)?;
         entry.set_item("deviation", surface.deviation)?;
         entry.set_item("count", surface.count)?;
+        entry.set_item("radius_std", surface.radius_std)?;
+        entry.set_item("major_radius_std", surface.major_radius_std)?;
+        entry.set_item("half_angle_std", surface.half_angle_std)?;
+        let parameters = surface.covariance.len().isqrt();
+        entry.set_item("covariance", surface.covariance.to_pyarray(py).reshape([parameters, parameters])?)?;
+        entry.set_item("across", surface.across.map(|direction| direction.to_pyarray(py)).to_vec())?;
+        entry.set_item("freedom", surface.freedom)?;
         Ok(entry)
     });
     let surfaces = surfaces.collect::<PyResult<_>>()?;

@@ -4,6 +4,7 @@ use super::least_squares::{EXACT, Patience, QUICK, refine};
 use super::primitive::{Primitive, SurfaceKind, Vector};
 use super::scene::{Scene, Stamps};
 use super::start::{bent, start};
+use nalgebra::Matrix3;
 
 /// Points that every surface has.
 const FEW: usize = 12;
@@ -35,6 +36,11 @@ const LARGE: usize = 2000;
 
 /// Extent of a curved surface in units of its radius.
 const LEAST_TURN: f64 = 0.15;
+
+/// Points whose neighbours are looked at to tell a surface from a line, and the second spread of a line's neighbours in
+/// units of the first (variances).
+const LOOKED_AT: usize = 100;
+const LINE: f64 = 0.01;
 
 /// Noise of so many floors is none.
 const NOISELESS: f64 = 20.0;
@@ -185,7 +191,7 @@ impl Grower<'_> {
         }
         region.members = scene.largest_part(&region.members, self.seen, self.inside);
         region.fit(scene, SAMPLE)?;
-        region.is_bent(scene).then_some(region)
+        (region.is_bent(scene) && !region.is_line(scene, self.inside)).then_some(region)
     }
 }
 
@@ -240,9 +246,30 @@ impl Region {
     }
 
     /// Whether it is a plane, or turns enough within its extent to be told from one: no plane is a huge cylinder.
-    fn is_bent(&self, scene: &Scene) -> bool {
+    pub fn is_bent(&self, scene: &Scene) -> bool {
         let (points, _) = scene.sample(&self.members, SAMPLE_OF_KIND);
         self.primitive.kind == SurfaceKind::Plane || extent(&points) >= LEAST_TURN * self.primitive.radius
+    }
+
+    /// Whether most of its points have their neighbours along a line only: one line of a lidar lies on the cone that its
+    /// beam sweeps, and that is no surface.
+    fn is_line(&self, scene: &Scene, inside: &mut Stamps) -> bool {
+        inside.clear();
+        self.members.iter().for_each(|&member| {
+            inside.set(member);
+        });
+        let step = self.members.len().div_ceil(LOOKED_AT);
+        let on_line = |&&member: &&u32| {
+            let others = scene.graph.of(member).filter(|&other| inside.has(other));
+            let from = scene.points[member as usize];
+            let spread: Matrix3<f64> =
+                others.map(|other| scene.points[other as usize] - from).map(|q| q * q.transpose()).sum();
+            let mut sizes = spread.symmetric_eigenvalues();
+            sizes.as_mut_slice().sort_by(f64::total_cmp);
+            sizes[1] < LINE * sizes[2]
+        };
+        let looked_at = self.members.len().div_ceil(step);
+        2 * self.members.iter().step_by(step).filter(on_line).count() > looked_at
     }
 
     /// Whether its points stray no more than noise does.
@@ -252,7 +279,7 @@ impl Region {
 }
 
 /// How far points are spread: the diagonal of their box.
-fn extent(points: &[Vector]) -> f64 {
+pub(super) fn extent(points: &[Vector]) -> f64 {
     let far = Vector::repeat(f64::INFINITY);
     let (low, high) = points.iter().fold((far, -far), |(low, high), p| (low.inf(p), high.sup(p)));
     (high - low).norm()

@@ -11,12 +11,15 @@ mod primitive;
 mod scene;
 mod settling;
 mod start;
+mod uncertainty;
 
 pub use primitive::SurfaceKind;
 
 use crate::{Error, Monitor, PointCloud, with_threads};
 use growth::{Grower, Region};
+use primitive::Vector;
 use scene::{LOCAL, NONE, Scene, Stamps};
+use uncertainty::uncertainty;
 
 /// Seeds of which surfaces begin; of larger clouds not every point is one.
 const MOST_SEEDS: usize = 100_000;
@@ -64,6 +67,22 @@ pub struct FoundSurface {
     pub deviation: f64,
     /// Number of its points.
     pub count: usize,
+    /// Standard errors of `radius`, `major_radius` and `half_angle`; not a number where they are, and where the points
+    /// do not determine them.
+    pub radius_std: f64,
+    /// See `radius_std`.
+    pub major_radius_std: f64,
+    /// See `radius_std`.
+    pub half_angle_std: f64,
+    /// Covariance of the parameters, row by row; empty where the points do not determine them. A plane's offset along
+    /// its normal and the normal's tilts; a sphere's centre and radius; of all others the shifts of `point`, the tilts
+    /// of the axis, and then the radius (cylinder), the radius and the half angle (cone), the shift along the axis, the
+    /// major radius and the tube's radius (torus). Shifts and tilts are along `across`.
+    pub covariance: Vec<f64>,
+    /// Two unit vectors across the axis.
+    pub across: [[f64; 3]; 2],
+    /// Degrees of freedom behind the covariance, for Student's t.
+    pub freedom: f64,
 }
 
 /// The surfaces of a scan.
@@ -161,20 +180,46 @@ fn assembled(points: usize, scene: &Scene, mut regions: Vec<Region>) -> FoundSur
         }
         // A fit that fails keeps the last one.
         let _ = region.fit(scene, usize::MAX);
-        let p = &region.primitive;
-        let only = |kinds: &[SurfaceKind], value: f64| if kinds.contains(&p.kind) { value } else { f64::NAN };
-        let axis = if p.kind == SurfaceKind::Sphere { [f64::NAN; 3] } else { p.axis.into() };
-        FoundSurface {
-            kind: p.kind,
-            point: (p.point + scene.origin).into(),
-            axis,
-            radius: if p.kind == SurfaceKind::Plane { f64::NAN } else { p.radius },
-            major_radius: only(&[SurfaceKind::Torus], p.major_radius),
-            half_angle: only(&[SurfaceKind::Cone], p.half_angle),
-            deviation: region.deviation,
-            count: region.members.len(),
-        }
+        described(region, scene)
     });
     let surfaces = surfaces.collect();
     FoundSurfaces { labels, surfaces }
+}
+
+/// A region's surface with its errors.
+fn described(region: &Region, scene: &Scene) -> FoundSurface {
+    let p = &region.primitive;
+    let points: Vec<Vector> = region.members.iter().map(|&member| scene.points[member as usize]).collect();
+    let sure = uncertainty(p, &points);
+    let parameters = p.kind.parameters();
+    // Of a parameter by its place in the covariance, on one kind of surface.
+    let deviation = |kind: SurfaceKind, place: usize| match &sure {
+        Some(sure) if p.kind == kind => sure.covariance[(place, place)].sqrt(),
+        _ => f64::NAN,
+    };
+    let radius_std = match p.kind {
+        SurfaceKind::Plane => f64::NAN,
+        SurfaceKind::Sphere => deviation(p.kind, 3),
+        SurfaceKind::Cylinder | SurfaceKind::Cone => deviation(p.kind, 4),
+        SurfaceKind::Torus => deviation(p.kind, 6),
+    };
+    let only = |kind: SurfaceKind, value: f64| if p.kind == kind { value } else { f64::NAN };
+    FoundSurface {
+        kind: p.kind,
+        point: (p.point + scene.origin).into(),
+        axis: if p.kind == SurfaceKind::Sphere { [f64::NAN; 3] } else { p.axis.into() },
+        radius: if p.kind == SurfaceKind::Plane { f64::NAN } else { p.radius },
+        major_radius: only(SurfaceKind::Torus, p.major_radius),
+        half_angle: only(SurfaceKind::Cone, p.half_angle),
+        deviation: region.deviation,
+        count: region.members.len(),
+        radius_std,
+        major_radius_std: deviation(SurfaceKind::Torus, 5),
+        half_angle_std: deviation(SurfaceKind::Cone, 5),
+        covariance: sure.as_ref().map_or_else(Vec::new, |sure| {
+            (0..parameters * parameters).map(|i| sure.covariance[(i / parameters, i % parameters)]).collect()
+        }),
+        across: p.chart().across.map(Into::into),
+        freedom: sure.map_or(f64::NAN, |sure| sure.freedom),
+    }
 }

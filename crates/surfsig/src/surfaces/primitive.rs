@@ -66,7 +66,7 @@ pub(super) struct Primitive {
 /// (cone), the shift along the axis, the major radius and the tube's radius (torus).
 pub(super) struct Chart {
     pub primitive: Primitive,
-    across: [Vector; 2],
+    pub across: [Vector; 2],
     sine: f64,
     cosine: f64,
 }
