@@ -1,4 +1,4 @@
-"""Which parts of a scan are planes, spheres, cylinders, cones and tori, how large they are, and how sure that is.
+"""Which parts of a scan are planes, spheres, cylinders, cones and tori, how large, and how sure that is.
 
 `surfsig.surfaces` finds them; `Surfaces` is what it gives.
 """

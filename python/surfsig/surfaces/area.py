@@ -1,4 +1,4 @@
-"""The area of a surface that points cover: it is unrolled into a plane without changing areas, and cells counted."""
+"""The area of a surface that points cover: cells are counted on a map of it that keeps areas."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from surfsig.surfaces.geometry import Array, Placement, across, middle_direction
 _POINTS = 20_000
 """Points that are looked at; of more, evenly chosen ones."""
 
-_NEIGHBOURS = 16
-"""A cell is as wide as it is far to so many neighbours: hardly any within the points is then empty by chance."""
+_NEIGHBOURS = 32
+"""A cell is as wide as it is far to so many neighbours: hardly any is then empty by chance."""
 
 
 def covered_area(placement: Placement, points: Array) -> float:
@@ -27,14 +27,13 @@ def covered_area(placement: Placement, points: Array) -> float:
 
     Returns
     -------
-    The area of the cells with points, of those at the border one half: that is how much of them is covered, in
-    the mean.
+    The area of the cells with points, of those at the border one half: so much of them is covered on average.
     """
     from scipy.spatial import KDTree
 
     flat = unrolled(placement, points[:: math.ceil(len(points) / _POINTS)])
     some = flat[:: math.ceil(len(flat) / 1000)]
-    reach, _ = KDTree(flat).query(some, [min(_NEIGHBOURS, len(flat))])
+    reach, _ = KDTree(flat).query(some, [min(_NEIGHBOURS, max(4, len(flat) // 8))])
     side = float(np.median(reach))
     if not side > 0:
         return math.nan

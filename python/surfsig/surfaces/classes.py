@@ -1,4 +1,4 @@
-"""What each point belongs to: a surface of some kind, a saddle, an edge or a free form; decided by significance."""
+"""What each point belongs to: a surface, a saddle, an edge or a free form; decided by significance."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ SIGNIFICANT = 2.576
 """Standard errors at which a curvature differs from 0: in 99 of 100 cases that is not by chance."""
 
 FAR_ABOVE = 2.0
-"""An edge's points stray so many times as much as noise: by chance less than one in 10,000 of 24 points do."""
+"""An edge's points stray so many times as much as noise: less than one of 10,000 does so by chance."""
 
 BEND = 1 / 40
-"""A smooth surface, whose curvature k changes by itself over its own radius, leaves the share (k r)^2 / 40 of the
-ball's radius r to a paraboloid's residual; an edge leaves more."""
+"""A smooth surface, whose curvature k changes by itself over its own radius, leaves a paraboloid the residual
+(k r)^2 r / 40 in a ball of radius r; an edge leaves more."""
 
 NEAR = 3.0
 """Standard deviations up to which points are a surface's."""
@@ -73,7 +73,9 @@ def classify(
         classes[members] = PointClass[surface.kind.upper()]
         distances = surface.distances(cloud.offsets[members] + cloud.origin)
         spacing = np.sqrt(surface.area / surface.count)
-        confidence[members] = _belonging(distances, max(surface.deviation, FLOOR * spacing)) * _evidence(surface)
+        confidence[members] = _belonging(distances, max(surface.deviation, FLOOR * spacing)) * _evidence(
+            surface
+        )
     classes[rest], confidence[rest] = _without_surface(around, _typical_noise(around, surfaces, noise))
     return classes, confidence
 
@@ -81,7 +83,7 @@ def classify(
 def members_of(labels: NDArray[np.int32], count: int) -> list[NDArray[np.intp]]:
     """Give the numbers of each surface's points, in their order."""
     order = np.argsort(labels, kind="stable")
-    return np.split(order, np.searchsorted(labels[order], np.arange(count + 1)))[1:]
+    return np.split(order, np.searchsorted(labels[order], np.arange(count + 1)))[1:-1]
 
 
 def _belonging(distances: NDArray[np.float64], deviation: float) -> NDArray[np.float64]:
@@ -104,7 +106,7 @@ def _evidence(surface: Surface) -> float:
 
 
 def _typical_noise(around: Extraction, surfaces: Sequence[Surface], noise: float | None) -> float:
-    """Give a point's noise: the one known, that of the surfaces' points, or what one in four of the others has."""
+    """Give a point's noise: as known, of the surfaces' points, or what a quarter of all others stay below."""
     if noise is not None:
         return noise
     if surfaces:
@@ -132,6 +134,8 @@ def _without_surface(around: Extraction, typical: float) -> tuple[NDArray[np.uin
     unexplained = np.clip(np.nan_to_num(unexplained), 0, 1)
     known = np.isfinite(k1)
     choices = [~known, edge, saddle]
-    classes = np.select(choices, [PointClass.UNKNOWN, PointClass.EDGE, PointClass.SADDLE], PointClass.FREE_FORM)
+    classes = np.select(
+        choices, [PointClass.UNKNOWN, PointClass.EDGE, PointClass.SADDLE], PointClass.FREE_FORM
+    )
     confidence = np.select(choices, [0.0 * k1, unexplained, both], 1 - both)
     return classes.astype(np.uint8), np.nan_to_num(confidence)

@@ -14,10 +14,15 @@ from numpy.typing import NDArray
 
 from surfsig.point_cloud import PointCloud
 from surfsig.surfaces.classes import PointClass, classify
+from surfsig.surfaces.colors import NO_SURFACE, surface_colors
 from surfsig.surfaces.surface import Surface
+from surfsig.surfaces.wording import HEADER, table_rows
 
 if TYPE_CHECKING:
     import pandas as pd
+
+FEWEST = 20
+"""Fewer points are never a surface by themselves."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,9 +62,9 @@ class Surfaces:
         """What each point belongs to, (n,), a `PointClass` as a number; made when first asked for.
 
         A point of a surface has its kind. Another point is judged by the paraboloid through its 24 nearest
-        points: an edge where that does not converge, or strays from it at least twice as far as noise does and
-        farther than a smooth surface would; else a saddle where k1 and k2 differ from 0 to different sides, at
-        their standard errors (99 %); else a free form.
+        points: an edge where that does not converge, or where they stray from it at least twice as far as
+        noise does and farther than from a smooth surface; else a saddle where k1 and k2 differ from 0 to
+        different sides, at their standard errors (99 %); else a free form.
         """
         return self._classified[0]
 
@@ -98,12 +103,27 @@ class Surfaces:
             For instance "7 surfaces: 6 planes, 1 sphere; 98.2 % of 12,000 points".
         """
         if not self.surfaces:
-            return f"no surface in {len(self.cloud):,} points"
+            return f"no surface found: {self._why_none()}"
         counts = Counter(surface.kind for surface in self.surfaces).most_common()
         kinds = ", ".join(f"{count} {_plural(kind, count)}" for kind, count in counts)
         share = float((self.labels >= 0).mean())
         total = f"{len(self)} {_plural('surface', len(self))}"
         return f"{total}: {kinds}; {share:.1%} of {len(self.cloud):,} points"
+
+    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Describe the surfaces for people, in sensible digits.
+
+        Returns
+        -------
+        The names of the columns, and a row for each surface: its number, kind, radius, the radius's 95 %
+        interval, size, area, number of points, rms.
+        """
+        return HEADER, table_rows(self)
+
+    @property
+    def colors(self) -> NDArray[np.uint8]:
+        """A colour for each point, (n, 3): red, green and blue of its surface, grey for none."""
+        return np.concatenate([surface_colors(len(self)), [NO_SURFACE]]).astype(np.uint8)[self.labels]
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Name what is known of each point, as files call it.
@@ -127,8 +147,8 @@ class Surfaces:
         Returns
         -------
         pandas.DataFrame
-            kind, radius, radius_std, radius_low, radius_high, major_radius, half_angle, center_x, ..., axis_z,
-            length, width, arc, area, count, rms.
+            kind, radius, radius_std, radius_low, radius_high, major_radius, half_angle, center_x, ...,
+            axis_x, ..., length, width, arc, area, count, rms.
 
         Raises
         ------
@@ -172,6 +192,16 @@ class Surfaces:
         text = page(self, title)
         with replacing(Path(path)) as file:
             file.write(text.encode())
+
+    def _why_none(self) -> str:
+        finite = int(self.cloud.finite.sum())
+        if not len(self.cloud):
+            return "there are no points"
+        if not finite:
+            return f"of {len(self.cloud):,} points none is finite"
+        if finite < FEWEST:
+            return f"{finite:,} points are too few"
+        return f"of {finite:,} points too few lie on any one surface, within the noise around them"
 
     def _numbers(self, name: str) -> NDArray[Any]:
         return np.array([getattr(surface, name) for surface in self])

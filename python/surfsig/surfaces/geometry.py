@@ -64,7 +64,7 @@ def across(axis: Array) -> tuple[Array, Array]:
 
 
 def covered_arc(placement: Placement, points: Array) -> float:
-    """Measure how far points go round: about the axis without the widest gap, of a sphere as seen from inside."""
+    """Measure how far points go round: about the axis, or of a sphere as seen from its center."""
     if placement.kind == "plane":
         return math.nan
     if placement.kind == "sphere":

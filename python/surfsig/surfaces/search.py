@@ -27,9 +27,9 @@ def surfaces(
 ) -> Surfaces:
     """Find the planes, spheres, cylinders, cones and tori of a scan, with their sizes and errors.
 
-    Surfaces grow from the smoothest points on, over neighbouring points that are within the noise around them;
-    the simplest kind that explains its points wins. Nothing needs to be set, and nothing is left to chance: the
-    result is always the same.
+    Surfaces grow from the smoothest points on, over neighbouring points that are within the noise around
+    them; the simplest kind that explains its points wins. Nothing needs to be set, and nothing is left to
+    chance: the result is always the same.
 
     Parameters
     ----------

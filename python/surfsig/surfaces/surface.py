@@ -28,8 +28,8 @@ PARAMETERS: dict[Kind, int] = {"plane": 3, "sphere": 4, "cylinder": 5, "cone": 6
 class Surface:
     """A plane, sphere, cylinder, cone or torus that was found in a scan, with its errors.
 
-    All lengths are in the points' own unit, all places in their coordinates, all angles in radians. NaN stands
-    for what a kind does not have.
+    All lengths are in the points' own unit, all places in their coordinates, all angles in radians. NaN
+    stands for what a kind does not have.
     """
 
     kind: Kind
@@ -37,7 +37,7 @@ class Surface:
     point: Array
     """(3,): where a plane's normal or an axis is held, near the points; the center of a sphere or torus."""
     axis: Array
-    """Unit vector (3,): a plane's normal; the axis of all others, along which a cone widens; NaN for a sphere."""
+    """Unit vector (3,): a plane's normal; the axis, along which a cone widens; NaN for a sphere."""
     radius: float
     """Of a sphere or cylinder; of a cone at `point`; of a torus's tube; NaN for a plane."""
     major_radius: float
@@ -53,7 +53,7 @@ class Surface:
     freedom: float
     """Degrees of freedom of these errors, for Student's t."""
     covariance: Array
-    """Of the parameters, (p, p): of a plane its shift and two tilts (p = 3); of a sphere the center x, y, z and
+    """Of the parameters, (p, p): of a plane its shift and two tilts (p = 3); of a sphere its center and
     the radius (4); of the others two shifts of the axis at `point` and its two tilts, then of a cylinder the
     radius (5), of a cone the radius and the half angle (6), of a torus the shift along the axis, the major
     radius and the radius (7)."""
@@ -63,13 +63,13 @@ class Surface:
     """(3,): of a sphere or torus its center; of a cylinder or cone the middle of the piece of its axis beside
     the points; of a plane the mean of its points."""
     length: float
-    """Of a cylinder, cone or torus, along the axis; of a plane the longer side of the smallest rectangle around
-    its points; NaN for a sphere."""
+    """Of a cylinder, cone or torus, along the axis; of a plane the longer side of the smallest rectangle
+    around its points; NaN for a sphere."""
     width: float
     """Of a plane, the shorter side of that rectangle; NaN for others."""
     arc: float
-    """Of a cylinder, cone or torus, how far the points go round the axis; of a sphere, how wide they are as seen
-    from the center: 2 pi is all of it; NaN for a plane."""
+    """Of a cylinder, cone or torus, how far the points go round the axis; of a sphere, how wide they are as
+    seen from its center: 2 pi is all of it; NaN for a plane."""
     area: float
     """Of the part of it that has points, as an estimate."""
     count: int
