@@ -85,9 +85,8 @@ def _figure(found: Surfaces) -> Any:
     finite = np.flatnonzero(found.cloud.finite)
     shown = finite[:: max(1, math.ceil(len(finite) / DRAWN))]
     points = found.cloud.offsets[shown] + found.cloud.origin
-    # Near 0 the browser's float32 loses nothing.
-    middle = points.mean(axis=0) if len(points) else np.zeros(3)
-    places = (points - middle).astype(np.float32)
+    origin = _origin(points)
+    places = (points - origin).astype(np.float32)
     labels = found.labels[shown]
     colors = [*surface_colors(len(found)).tolist(), NO_SURFACE]
     header, rows = found.table()
@@ -102,17 +101,27 @@ def _figure(found: Surfaces) -> Any:
             else []
         )
         traces.append(_trace(go, places[members], number if row else -1, name, words, color))
-    axes = {
-        f"{letter}axis": {"title": {"text": letter if abs(at) < 1e-12 else f"{letter} - {at:.6g}"}}
-        for letter, at in zip("xyz", middle, strict=True)
-    }
+    titles = [f"{letter} - {at:.15g}" if at else letter for letter, at in zip("xyz", origin, strict=True)]
+    axes = {f"{letter}axis": {"title": {"text": text}} for letter, text in zip("xyz", titles, strict=True)}
     figure = go.Figure(traces)
     figure.update_layout(
-        scene={"aspectmode": "data", **axes},
+        scene={"aspectmode": "data", "camera": {"eye": {"x": 1.4, "y": 1.4, "z": 1.1}}, **axes},
         margin={"l": 0, "r": 0, "t": 0, "b": 0},
-        legend={"itemsizing": "constant"},
+        # Below the buttons.
+        legend={"itemsizing": "constant", "y": 0.93},
     )
     return figure
+
+
+def _origin(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give a round place near points that are far from 0, for the browser has float32 only; else 0."""
+    extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+    middle = points.mean(axis=0) if len(points) else np.zeros(3)
+    if not extent > 0:
+        return middle
+    step = 10.0 ** math.floor(math.log10(extent))
+    origin: NDArray[np.float64] = np.where(np.abs(middle) > 100 * extent, np.round(middle / step) * step, 0.0)
+    return origin
 
 
 def _trace(go: Any, places: NDArray[np.float32], number: int, name: str, words: list[str], color: Any) -> Any:
