@@ -1,62 +1,106 @@
-"""Time surfsig's curvature as a cloud gets denser, and its kinds of fit: tables for BENCHMARKS.md.
+"""Time surfsig's curvature as a cloud gets denser, kinds of fit, several radii: tables for BENCHMARKS.md.
 
-python benchmarks/density.py
+python benchmarks/density.py --write
 
-All in one process, in turns; the medians are printed, and the ranges of the ratios.
+All in one process, in turns; the medians are reported, and the ranges of the ratios.
 """
 
 from __future__ import annotations
 
+import argparse
+import datetime
 from collections.abc import Callable
 
 import numpy as np
-from clouds import bumpy_square
+from clouds import SCALING_POINTS, bumpy_square, bumpy_tenth
+from machine import ROOT, describe_machine, own_versions
 from numpy.typing import NDArray
-from timing import seconds_of
+from report import TARGET_POINTS, TARGET_RADIUS, Row, markdown_table, measured_on, update_section
+from timing import times_of
 
 import surfsig
 
-ROUNDS, RADIUS, DENSEST = 5, 0.02, 2_000_000
+ROUNDS = 5
+CLOSE_RADII = (0.6, 0.7, 0.8, 0.9, 1.0)
+RADII_LADDER = (1 / 4, 1 / 2.83, 1 / 2, 1 / 1.41, 1.0)
+COLUMNS = ("neighbours", "points", "points/s", "cost per point (range)", "the same in processor time")
+
+Job = Callable[[], surfsig.Extraction]
 
 
 def main() -> None:
-    """Print both tables."""
-    densest = bumpy_square(DENSEST)
-    clouds = [bumpy_square(200_000), densest]
-    # A hundred times as dense as the first: all points of a square whose area is a tenth of the second's.
-    clouds.append(_squeezed(densest, 10**-0.5))
-    print("| neighbours | points | points/s | cost per point (range) |\n| --- | --- | --- | --- |")
-    _table([(lambda cloud=cloud: surfsig.extract(cloud, RADIUS)) for cloud in clouds])  # type: ignore[misc]
-    sparse = clouds[0]
-    print("\n| fit | points | points/s | cost per point (range) |\n| --- | --- | --- | --- |")
-    jobs: list[Callable[[], surfsig.Extraction]] = [
-        lambda: surfsig.extract(sparse, RADIUS),
-        lambda: surfsig.extract(sparse, RADIUS, fit="quadric"),
-        lambda: surfsig.extract(sparse, RADIUS, fit="auto"),
-        lambda: surfsig.extract(sparse, RADIUS, robust=True),
-        lambda: surfsig.extract(sparse, neighbors=235),
+    """Print the tables, and write them into BENCHMARKS.md where asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--write", action="store_true", help="update BENCHMARKS.md")
+    arguments = parser.parse_args()
+    facts = {
+        "machine": describe_machine(),
+        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
+        "versions": own_versions(),
+    }
+    sparse = bumpy_square(TARGET_POINTS)
+    clouds = (sparse, bumpy_square(SCALING_POINTS), bumpy_tenth(SCALING_POINTS))
+    parts = [
+        table("cloud", [(f"{len(c):,} points", one_radius(c)) for c in clouds]),
+        table("fit", kinds_of_fit(sparse)),
+        table("radii", several_radii(sparse)),
+        table("radii", several_radii(bumpy_tenth(TARGET_POINTS))),
+        "\n".join(f"- {note}" for note in measured_on(facts)),
     ]
-    _table(jobs, ["paraboloid", "quadric", "auto", "paraboloid, robust", "paraboloid, 235 nearest"])
+    text = "\n\n".join(parts)
+    print(text)
+    if arguments.write:
+        update_section(ROOT / "BENCHMARKS.md", "python benchmarks/density.py --write", text)
 
 
-def _squeezed(cloud: NDArray[np.float32], factor: float) -> NDArray[np.float32]:
-    """Bring the points closer in x and y, over bumps as wide as before, with the noise as it was."""
-    x, y = (factor * cloud[:, axis].astype(np.float64) for axis in (0, 1))
-    bumps = 0.05 * np.sin(7 * x) * np.cos(9 * y) + 0.01 * np.sin(40 * x + 3) * np.sin(31 * y)
-    z = bumps + np.random.default_rng(2).normal(0, 2e-4, len(cloud))
-    return np.column_stack([x, y, z]).astype(np.float32)
+def one_radius(cloud: NDArray[np.float32]) -> Job:
+    """Return the extraction at one radius, with everything at its default."""
+    return lambda: surfsig.extract(cloud, TARGET_RADIUS)
 
 
-def _table(jobs: list[Callable[[], surfsig.Extraction]], names: list[str] | None = None) -> None:
-    found = [job() for job in jobs]
-    seconds = np.array([[seconds_of(job) for job in jobs] for _ in range(ROUNDS)])
-    per_point = seconds / [len(s) for s in found]
-    ratios = per_point / per_point[:, :1]
-    for i, s in enumerate(found):
-        name = names[i] if names else f"{s.count.mean():,.0f}"
-        low, middle, high = np.quantile(ratios[:, i], (0, 0.5, 1))
-        rate = 1 / np.median(per_point[:, i])
-        print(f"| {name} | {len(s):,} | {rate:,.0f} | {middle:.2f} ({low:.2f} to {high:.2f}) |")
+def kinds_of_fit(cloud: NDArray[np.float32]) -> list[tuple[str, Job]]:
+    """Return an extraction with each kind of fit, and one with nearest points."""
+    return [
+        ("paraboloid", one_radius(cloud)),
+        ("quadric", lambda: surfsig.extract(cloud, TARGET_RADIUS, fit="quadric")),
+        ("auto", lambda: surfsig.extract(cloud, TARGET_RADIUS, fit="auto")),
+        ("paraboloid, robust", lambda: surfsig.extract(cloud, TARGET_RADIUS, robust=True)),
+        ("paraboloid, 235 nearest", lambda: surfsig.extract(cloud, neighbors=235)),
+    ]
+
+
+def several_radii(cloud: NDArray[np.float32]) -> list[tuple[str, Job]]:
+    """Return the extraction at the largest radius, at five of them, and where each point chooses its own."""
+
+    def one_pass(shares: tuple[float, ...]) -> surfsig.Extraction:
+        return surfsig.extract_radii(cloud, [share * TARGET_RADIUS for share in shares])[-1]
+
+    def one_by_one(shares: tuple[float, ...]) -> surfsig.Extraction:
+        return [surfsig.extract(cloud, share * TARGET_RADIUS) for share in shares][-1]
+
+    return [
+        ("r = 0.02", one_radius(cloud)),
+        ("0.6 r, 0.7 r, 0.8 r, 0.9 r, r", lambda: one_pass(CLOSE_RADII)),
+        ("the same, one by one", lambda: one_by_one(CLOSE_RADII)),
+        ("r/4, r/2.83, r/2, r/1.41, r", lambda: one_pass(RADII_LADDER)),
+        ("the same, one by one", lambda: one_by_one(RADII_LADDER)),
+        ('"auto"', lambda: surfsig.extract(cloud, "auto")),
+    ]
+
+
+def table(title: str, jobs: list[tuple[str, Job]]) -> str:
+    """Time the jobs in turns and compare each one's cost per point with the first one's in the same round."""
+    found = [job() for _, job in jobs]
+    points = np.array([len(s) for s in found])
+    times = np.array([[times_of(job) for _, job in jobs] for _ in range(ROUNDS)])
+    cost = times / points[:, None]
+    low, middle, high = np.quantile(cost / cost[:, :1], (0, 0.5, 1), axis=0)
+    rates = 1 / np.median(cost[:, :, 0], axis=0)
+    rows: list[Row] = []
+    for i, (name, _) in enumerate(jobs):
+        ratios = [f"{middle[i, t]:.2f} ({low[i, t]:.2f} to {high[i, t]:.2f})" for t in (0, 1)]
+        rows.append((name, f"{found[i].count.mean():,.0f}", f"{points[i]:,}", f"{rates[i]:,.0f}", *ratios))
+    return markdown_table((title, *COLUMNS), rows)
 
 
 if __name__ == "__main__":

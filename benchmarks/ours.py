@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 from clouds import NEIGHBOUR_SAMPLE, evenly_spaced
-from timing import add_job_arguments, finite_share, median_seconds, report, seconds_of
+from timing import add_job_arguments, finite_share, median_times, report, seconds_of, times_of
 
 import surfsig
 
@@ -27,8 +27,9 @@ SIGNATURE_BLOCK = 250_000
 def extract(cloud: npt.NDArray[np.float32], radius: float, threads: int) -> surfsig.Extraction:
     """Extract at all points, and touch the arrays that count, should one be made only when asked for."""
     extraction = surfsig.extract(cloud, radius=radius, threads=threads)
-    for values in (extraction.k1, extraction.k2, extraction.normals, extraction.residual):
-        assert len(values) == len(cloud)
+    values = (extraction.k1, extraction.k2, extraction.normals, extraction.residual)
+    errors = (extraction.mean_curvature_std, extraction.k1_std, extraction.k2_std, extraction.noise)
+    assert all(len(array) == len(cloud) for array in values + errors)
     return extraction
 
 
@@ -57,12 +58,12 @@ def time_method(method: str, cloud: npt.NDArray[np.float32], radius: float, thre
     """Print the median time of several runs, and the first one's, which also starts the threads."""
     work = METHODS[method]
     first = seconds_of(lambda: work(cloud, radius, threads))
-    seconds = median_seconds(lambda: work(cloud, radius, threads), RUNS)
+    times = median_times(lambda: work(cloud, radius, threads), RUNS)
     extraction = extract(cloud, radius, threads)
     report(
         method,
         len(cloud),
-        seconds,
+        times,
         mean_count(extraction),
         threads,
         first_seconds=first,
@@ -92,13 +93,13 @@ def measure_memory(cloud: npt.NDArray[np.float32], radius: float, threads: int) 
         nonlocal extraction
         extraction = extract(cloud, radius, threads)
 
-    seconds = seconds_of(work)
+    times = times_of(work)
     peak = resident_bytes("VmHWM")
     assert extraction is not None
     report(
         "memory",
         len(cloud),
-        seconds,
+        times,
         mean_count(extraction),
         threads,
         peak_bytes=peak - before,

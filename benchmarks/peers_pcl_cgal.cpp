@@ -21,6 +21,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <ctime>
 #include <exception>
 #include <fstream>
 #include <functional>
@@ -44,8 +45,13 @@ struct Job {
   int threads;
 };
 
-struct Outcome {
+struct Times {
   double seconds;
+  double processor_seconds;  // of all threads together
+};
+
+struct Outcome {
+  Times times;
   std::size_t valid;  // how many answers are finite
 };
 
@@ -79,10 +85,13 @@ double mean_neighbours(const Job& job) {
 }
 
 template <class Work>
-double seconds_of(const Work& work) {
+Times times_of(const Work& work) {
   const auto start = std::chrono::steady_clock::now();
+  const std::clock_t processor_start = std::clock();
   work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const std::clock_t processor_time = std::clock() - processor_start;
+  const auto time = std::chrono::steady_clock::now() - start;
+  return {std::chrono::duration<double>(time).count(), static_cast<double>(processor_time) / CLOCKS_PER_SEC};
 }
 
 template <class Point, class IsFinite>
@@ -110,8 +119,8 @@ Outcome pcl_normals(const Job& job) {
   auto estimation = normal_estimation(job);
   estimation.setIndices(job.queries);
   Normals normals;
-  const double seconds = seconds_of([&] { estimation.compute(normals); });
-  return {seconds, count_valid(normals, normal_is_finite)};
+  const Times times = times_of([&] { estimation.compute(normals); });
+  return {times, count_valid(normals, normal_is_finite)};
 }
 
 // PCL has no parallel version of this one.
@@ -123,8 +132,8 @@ Outcome pcl_curvatures(const Job& job) {
   estimation.setRadiusSearch(job.radius);
   estimation.setIndices(job.queries);
   pcl::PointCloud<pcl::PrincipalCurvatures> curvatures;
-  const double seconds = seconds_of([&] { estimation.compute(curvatures); });
-  return {seconds, count_valid(curvatures, [](const auto& curvature) { return std::isfinite(curvature.pc1); })};
+  const Times times = times_of([&] { estimation.compute(curvatures); });
+  return {times, count_valid(curvatures, [](const auto& curvature) { return std::isfinite(curvature.pc1); })};
 }
 
 Outcome pcl_fpfh(const Job& job) {
@@ -135,8 +144,8 @@ Outcome pcl_fpfh(const Job& job) {
   estimation.setRadiusSearch(job.radius);
   estimation.setIndices(job.queries);
   pcl::PointCloud<pcl::FPFHSignature33> histograms;
-  const double seconds = seconds_of([&] { estimation.compute(histograms); });
-  return {seconds, count_valid(histograms, [](const auto& h) { return std::isfinite(h.histogram[0]); })};
+  const Times times = times_of([&] { estimation.compute(histograms); });
+  return {times, count_valid(histograms, [](const auto& h) { return std::isfinite(h.histogram[0]); })};
 }
 
 // CGAL fits a jet to points that somebody else has found: PCL's tree finds them here.
@@ -146,13 +155,13 @@ Outcome cgal_jet(const Job& job, std::size_t degree) {
   const std::size_t fewest = (degree + 1) * (degree + 2) / 2;
   const auto to_cgal = [](const pcl::PointXYZ& p) { return Kernel::Point_3(p.x, p.y, p.z); };
   std::size_t valid = 0;
-  const double seconds = seconds_of([&] {
+  const Times times = times_of([&] {
 #pragma omp parallel num_threads(job.threads) reduction(+ : valid)
     {
       pcl::Indices indices;
       std::vector<float> squared_distances;
       std::vector<Kernel::Point_3> points;
-#pragma omp for schedule(dynamic, 64)
+#pragma omp for schedule(dynamic, 16)
       for (std::size_t q = 0; q < job.queries->size(); ++q) {
         const int query = (*job.queries)[q];
         job.tree->radiusSearch((*job.cloud)[query], job.radius, indices, squared_distances);
@@ -166,7 +175,7 @@ Outcome cgal_jet(const Job& job, std::size_t degree) {
       }
     }
   });
-  return {seconds, valid};
+  return {times, valid};
 }
 
 const std::map<std::string, std::function<Outcome(const Job&)>> METHODS = {
@@ -197,7 +206,8 @@ void time_method(const std::string& name, const std::string& path, double radius
   const auto points = static_cast<double>(job.queries->size());
   std::cout.precision(9);
   std::cout << R"({"method": ")" << name << R"(", "points": )" << job.queries->size() << R"(, "seconds": )"
-            << outcome.seconds << R"(, "points_per_second": )" << points / outcome.seconds
+            << outcome.times.seconds << R"(, "processor_seconds": )" << outcome.times.processor_seconds
+            << R"(, "points_per_second": )" << points / outcome.times.seconds
             << R"(, "mean_neighbours": )" << mean_neighbours(job) << R"(, "threads": )"
             << (name == "pcl_curvatures" ? 1 : threads) << R"(, "valid": )"
             << static_cast<double>(outcome.valid) / points << "}\n";

@@ -16,7 +16,7 @@ from importlib import metadata
 import numpy as np
 import numpy.typing as npt
 from clouds import evenly_spaced, mean_neighbours
-from timing import add_job_arguments, finite_share, report, seconds_of
+from timing import add_job_arguments, finite_share, report, times_of
 
 DISTRIBUTIONS = ("open3d-cpu", "jakteristics", "small_gicp", "numpy")
 WARM_UP_POINTS = 2000
@@ -25,8 +25,8 @@ WARM_UP_POINTS = 2000
 JAKTERISTICS_FEATURES = ["planarity", "linearity", "sphericity", "surface_variation"]
 
 Cloud = npt.NDArray[np.float64]
-Timed = tuple[float, float]
-"""Seconds, and the share of the answers that are finite."""
+Timed = tuple[tuple[float, float], float]
+"""What `times_of` gives, and the share of the answers that are finite."""
 
 
 def open3d_normals(cloud: Cloud, radius: float, threads: int) -> Timed:
@@ -35,8 +35,8 @@ def open3d_normals(cloud: Cloud, radius: float, threads: int) -> Timed:
 
     points = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(cloud))
     search = open3d.geometry.KDTreeSearchParamRadius(radius)
-    seconds = seconds_of(lambda: points.estimate_normals(search))
-    return seconds, finite_share(points.normals)
+    times = times_of(lambda: points.estimate_normals(search))
+    return times, finite_share(points.normals)
 
 
 def open3d_fpfh(cloud: Cloud, radius: float, threads: int) -> Timed:
@@ -48,8 +48,8 @@ def open3d_fpfh(cloud: Cloud, radius: float, threads: int) -> Timed:
     points.estimate_normals(search)
     histograms = []
     compute = open3d.pipelines.registration.compute_fpfh_feature
-    seconds = seconds_of(lambda: histograms.append(compute(points, search).data))
-    return seconds, finite_share(histograms[0].T)
+    times = times_of(lambda: histograms.append(compute(points, search).data))
+    return times, finite_share(histograms[0].T)
 
 
 def jakteristics_features(cloud: Cloud, radius: float, threads: int) -> Timed:
@@ -58,14 +58,14 @@ def jakteristics_features(cloud: Cloud, radius: float, threads: int) -> Timed:
 
     tree = jakteristics.cKDTree(cloud)
     features = []
-    seconds = seconds_of(
+    times = times_of(
         lambda: features.append(
             jakteristics.compute_features(
                 cloud, radius, kdtree=tree, num_threads=threads, feature_names=JAKTERISTICS_FEATURES
             )
         )
     )
-    return seconds, finite_share(features[0])
+    return times, finite_share(features[0])
 
 
 def small_gicp_covariances(cloud: Cloud, radius: float, threads: int) -> Timed:
@@ -75,12 +75,12 @@ def small_gicp_covariances(cloud: Cloud, radius: float, threads: int) -> Timed:
     points = small_gicp.PointCloud(cloud)
     tree = small_gicp.KdTree(points, num_threads=threads)
     neighbours = neighbours_to_ask_for(cloud, radius)
-    seconds = seconds_of(
+    times = times_of(
         lambda: small_gicp.estimate_normals_covariances(
             points, tree, num_neighbors=neighbours, num_threads=threads
         )
     )
-    return seconds, finite_share(points.normals())
+    return times, finite_share(points.normals())
 
 
 def neighbours_to_ask_for(cloud: Cloud, radius: float) -> int:
@@ -112,8 +112,8 @@ def time_method(method: str, path: str, radius: float, threads: int) -> None:
     single = np.load(path)
     cloud = np.ascontiguousarray(single, dtype=np.float64)
     METHODS[method](np.ascontiguousarray(cloud[evenly_spaced(WARM_UP_POINTS, len(cloud))]), radius, threads)
-    seconds, valid = METHODS[method](cloud, radius, threads)
-    report(method, len(cloud), seconds, mean_neighbours(single, radius), threads, valid=valid)
+    times, valid = METHODS[method](cloud, radius, threads)
+    report(method, len(cloud), times, mean_neighbours(single, radius), threads, valid=valid)
 
 
 def main() -> None:

@@ -21,11 +21,27 @@ COLUMNS = (
     "threads",
     "points/s (range)",
     "surfsig's speed / this one's (range)",
+    "the same in processor time",
 )
 TARGET_COLUMNS = ("target", "wanted", "reached", "")
 
 Results = dict[str, Any]
 Row = tuple[str, ...]
+Target = tuple[str, int, tuple[str, ...]]
+"""What is computed beside what, how many times as fast it is to be, and the peers' names."""
+
+SPEED_TARGETS: tuple[Target, ...] = (
+    ("Curvature: the faster of PCL's normals, jakteristics", 12, ("pcl_normals", "jakteristics")),
+    ("The same, PCL's tree told not to sort", 12, ("pcl_normals_unsorted", "jakteristics")),
+    ("Curvature: Open3D's normals", 20, ("open3d_normals",)),
+    ("Curvature and its errors: Open3D's normals", 30, ("open3d_normals",)),
+    ("Curvature and its errors: CGAL's jets of degree 2", 100, ("cgal_jet2",)),
+    ("With all 242 numbers: Open3D's FPFH", 50, ("open3d_fpfh",)),
+    ("With all 242 numbers: Open3D's FPFH", 100, ("open3d_fpfh",)),
+)
+DENSE_TARGETS: tuple[Target, ...] = (
+    ("A hundred times as dense: CGAL's jets of degree 2", 2500, ("cgal_jet2",)),
+)
 
 
 @dataclass(frozen=True)
@@ -60,28 +76,39 @@ def ratio(pairs: Results) -> Spread:
     return Spread.of(ours["points_per_second"] / theirs["points_per_second"] for ours, theirs in both)
 
 
-def method_rows(results: Results, at_radius: Results) -> list[Row]:
+def processor_ratio(pairs: Results) -> Spread:
+    """Return how many times the processor time per point of surfsig the peer took, in the same pairs."""
+    both = zip(pairs["ours"], pairs["theirs"], strict=True)
+    return Spread.of(processor_cost(theirs) / processor_cost(ours) for ours, theirs in both)
+
+
+def processor_cost(run: Results) -> float:
+    """Return the processor's seconds per point."""
+    return float(run["processor_seconds"] / run["points"])
+
+
+def method_rows(at_radius: Results) -> list[Row]:
     """Return the table of one radius, a row for each method."""
     labels = {"curvature": "surfsig", "signatures": "surfsig, with signatures"}
     what = {
-        "curvature": "k1, k2, directions, normal, residual, shape",
+        "curvature": "k1, k2, their errors, directions, normal, residual, shape",
         "signatures": "the same and 242 numbers",
     }
     rows: list[Row] = []
-    for kind in labels:
-        ours = at_radius["ours"][kind]
-        rows.append((labels[kind], what[kind], *run_cells(ours), "1"))
+    for kind, ours in at_radius["ours"].items():
+        rows.append((labels[kind], what[kind], *run_cells(ours), "1", "1"))
         for peer in PEERS:
             pairs = at_radius["peers"].get(peer.name)
             if peer.counterpart != kind or pairs is None:
                 continue
             if pairs["skipped"]:
-                rows.append((peer.label, peer.computes, "", "", f"not measured: {pairs['skipped']}", ""))
+                rows.append((peer.label, peer.computes, "", "", f"not measured: {pairs['skipped']}", "", ""))
                 continue
             timed = pairs["theirs"][0]["points"]
-            some = "" if timed == results["settings"]["points"] else f" ({timed:,} points timed)"
+            some = "" if timed == at_radius["points"] else f" ({timed:,} points timed)"
             cells = run_cells(pairs["theirs"])
-            rows.append((peer.label + some, peer.computes, *cells, ratio(pairs).text(".1f")))
+            ratios = (ratio(pairs).text(",.1f"), processor_ratio(pairs).text(",.1f"))
+            rows.append((peer.label + some, peer.computes, *cells, *ratios))
     return rows
 
 
@@ -96,7 +123,8 @@ def target_rows(results: Results) -> list[Row]:
     if results["settings"]["points"] == TARGET_POINTS:
         for at_radius in results["radii"]:
             if at_radius["radius"] == TARGET_RADIUS:
-                rows += speed_targets(at_radius["peers"])
+                rows += speed_targets(at_radius["peers"], SPEED_TARGETS)
+        rows += speed_targets(results["dense"]["peers"], DENSE_TARGETS)
     memory = results["memory"]
     if memory["skipped"]:
         rows.append(("Memory above the input", "<= 250 MB", "not measured", ""))
@@ -109,23 +137,18 @@ def target_rows(results: Results) -> list[Row]:
     return rows
 
 
-def speed_targets(peers: Results) -> list[Row]:
+def speed_targets(peers: Results, targets: Iterable[Target]) -> list[Row]:
     """Return the rows of the speeds; a target with several peers counts against the fastest of them."""
-    targets = (
-        ("Curvature: the faster of PCL's normals, jakteristics", 12, ("pcl_normals", "jakteristics")),
-        ("The same, PCL's tree told not to sort", 12, ("pcl_normals_unsorted", "jakteristics")),
-        ("Curvature: Open3D's normals", 20, ("open3d_normals",)),
-        ("With all 242 numbers: Open3D's FPFH", 50, ("open3d_fpfh",)),
-    )
     rows: list[Row] = []
     for label, wanted, names in targets:
         missing = [name for name in names if name not in peers or peers[name]["skipped"]]
         if missing:
-            rows.append((label, f">= {wanted} times", f"not measured without {', '.join(missing)}", ""))
+            rows.append((label, f">= {wanted:,} times", f"not measured without {', '.join(missing)}", ""))
             continue
-        reached = min((ratio(peers[name]) for name in names), key=lambda spread: spread.median)
-        met = verdict(reached.median >= wanted)
-        rows.append((label, f">= {wanted} times", f"{reached.text('.1f')} times", met))
+        fastest = min((peers[name] for name in names), key=lambda pairs: ratio(pairs).median)
+        reached = ratio(fastest)
+        text = f"{reached.text(',.1f')} times; {processor_ratio(fastest).median:,.1f} in processor time"
+        rows.append((label, f">= {wanted:,} times", text, verdict(reached.median >= wanted)))
     return rows
 
 
@@ -147,7 +170,7 @@ def notes(results: Results) -> list[str]:
     first = statistics.median(run["first_seconds"] for run in results["radii"][0]["ours"]["curvature"])
     return [
         *measured_on(results),
-        f"{settings['points']:,} points; threads: {settings['threads']}; rounds: {settings['rounds']}.",
+        f"Threads: {settings['threads']}; rounds: {settings['rounds']}.",
         f"The first extraction of a process at radius {results['radii'][0]['radius']} took {first:.3f} s; "
         "the speeds are those of the later ones.",
         memory_note(results["memory"]),
@@ -183,11 +206,16 @@ def memory_note(memory: Results) -> str:
 
 def print_tables(results: Results, console: Console) -> None:
     """Print everything on a terminal."""
-    for at_radius in results["radii"]:
-        console.print(rich_table(f"radius {at_radius['radius']}", COLUMNS, method_rows(results, at_radius)))
+    for at_radius in [*results["radii"], results["dense"]]:
+        console.print(rich_table(table_title(at_radius), COLUMNS, method_rows(at_radius)))
     console.print(rich_table("targets", TARGET_COLUMNS, target_rows(results)))
     for note in notes(results):
         console.print(note, highlight=False)
+
+
+def table_title(at_radius: Results) -> str:
+    """Name the radius and the cloud of a table."""
+    return f"Radius {at_radius['radius']}, {at_radius['cloud']}"
 
 
 def rich_table(title: str, columns: Sequence[str], rows: Iterable[Row]) -> Table:
@@ -201,9 +229,9 @@ def rich_table(title: str, columns: Sequence[str], rows: Iterable[Row]) -> Table
 def markdown(results: Results) -> str:
     """Return the same tables and notes as Markdown."""
     parts = [markdown_table(TARGET_COLUMNS, target_rows(results))]
-    for at_radius in results["radii"]:
-        parts.append(f"### Radius {at_radius['radius']}")
-        parts.append(markdown_table(COLUMNS, method_rows(results, at_radius)))
+    for at_radius in [*results["radii"], results["dense"]]:
+        parts.append(f"### {table_title(at_radius)}")
+        parts.append(markdown_table(COLUMNS, method_rows(at_radius)))
     parts.append("\n".join(f"- {note}" for note in notes(results)))
     return "\n\n".join(parts)
 

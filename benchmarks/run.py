@@ -7,15 +7,18 @@ peer, and so on), each in a process of its own, so that a machine that slows dow
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import datetime
 import json
 import sys
 import tempfile
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-from clouds import SCALING_POINTS, bumpy_square
+import numpy.typing as npt
+from clouds import SCALING_POINTS, bumpy_square, bumpy_tenth
 from machine import describe_machine, import_seconds, own_versions
 from peers import (
     BUILD,
@@ -36,6 +39,7 @@ from rich.progress import Progress
 OURS: Command = [sys.executable, HERE / "ours.py"]
 IMPORT_RUNS = 7
 QUICK_POINTS = 20_000
+DENSE_PEER, DENSE_QUERIES = "cgal_jet2", 500
 PIPE_COLUMNS = 140
 MOST_BUSY = 0.1
 
@@ -45,12 +49,13 @@ Programs = dict[str, Command | PeerUnavailable]
 class Cloud:
     """A cloud on disk, in the formats that the programs read."""
 
-    def __init__(self, folder: Path, points: int) -> None:
-        self.array_file = folder / f"{points}.npy"
-        self.raw_file = folder / f"{points}.f32"
-        cloud = bumpy_square(points)
-        np.save(self.array_file, cloud)
-        cloud.tofile(self.raw_file)
+    def __init__(self, folder: Path, name: str, points: npt.NDArray[np.float32]) -> None:
+        self.name = f"{len(points):,} points on {name}"
+        self.points = len(points)
+        self.array_file = folder / f"{name}.npy"
+        self.raw_file = folder / f"{name}.f32"
+        np.save(self.array_file, points)
+        points.tofile(self.raw_file)
 
 
 def prepare_programs(peers: list[Peer]) -> Programs:
@@ -103,11 +108,16 @@ def time_peer(peer: Peer, programs: Programs, cloud: Cloud, radius: float, threa
 
 
 def measure_radius(
-    radius: float, cloud: Cloud, programs: Programs, plan: argparse.Namespace, progress: Progress
+    radius: float,
+    cloud: Cloud,
+    peers: list[Peer],
+    programs: Programs,
+    plan: argparse.Namespace,
+    progress: Progress,
+    kinds: Sequence[str] = ("curvature", "signatures"),
 ) -> Results:
     """Run all rounds of the plan, which is the command line, at one radius."""
-    peers = chosen_peers(plan)
-    ours: dict[str, list[Results]] = {"curvature": [], "signatures": []}
+    ours: dict[str, list[Results]] = {kind: [] for kind in kinds}
     pairs: dict[str, Results] = {peer.name: {"ours": [], "theirs": [], "skipped": None} for peer in peers}
     task = progress.add_task("", total=plan.rounds * len(peers))
     for round_number in range(plan.rounds):
@@ -125,7 +135,7 @@ def measure_radius(
                 except PeerUnavailable as reason:
                     pair["skipped"] = str(reason)
             progress.advance(task)
-    return {"radius": radius, "ours": ours, "peers": pairs}
+    return {"radius": radius, "cloud": cloud.name, "points": cloud.points, "ours": ours, "peers": pairs}
 
 
 def chosen_peers(plan: argparse.Namespace) -> list[Peer]:
@@ -135,7 +145,11 @@ def chosen_peers(plan: argparse.Namespace) -> list[Peer]:
 
 def measure(plan: argparse.Namespace, console: Console) -> Results:
     """Make the clouds, run everything and return the results."""
-    programs = prepare_programs(chosen_peers(plan))
+    peers = chosen_peers(plan)
+    few_queries = [
+        dataclasses.replace(peer, queries=DENSE_QUERIES) for peer in peers if peer.name == DENSE_PEER
+    ]
+    programs = prepare_programs(peers)
     machine = describe_machine()
     if (machine["busy_share_before"] or 0) > MOST_BUSY:
         print("other programs keep the processor busy: the figures will not be good", file=sys.stderr)
@@ -154,10 +168,16 @@ def measure(plan: argparse.Namespace, console: Console) -> Results:
         "import_seconds": import_seconds(IMPORT_RUNS),
     }
     with tempfile.TemporaryDirectory() as folder, Progress(console=console, transient=True) as progress:
-        dense = Cloud(Path(folder), scaling_points)
-        results["memory"] = measure_memory(dense, plan.threads)
-        cloud = Cloud(Path(folder), points)
-        results["radii"] = [measure_radius(radius, cloud, programs, plan, progress) for radius in plan.radius]
+        large = Cloud(Path(folder), "the large square", bumpy_square(scaling_points))
+        results["memory"] = measure_memory(large, plan.threads)
+        cloud = Cloud(Path(folder), "the square", bumpy_square(points))
+        results["radii"] = [
+            measure_radius(radius, cloud, peers, programs, plan, progress) for radius in plan.radius
+        ]
+        dense = Cloud(Path(folder), "a tenth of the square", bumpy_tenth(scaling_points))
+        results["dense"] = measure_radius(
+            TARGET_RADIUS, dense, few_queries, programs, plan, progress, kinds=["curvature"]
+        )
     return results
 
 

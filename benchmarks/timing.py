@@ -21,9 +21,17 @@ def seconds_of(work: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
-def median_seconds(work: Callable[[], object], runs: int) -> float:
-    """Run `work` several times and return the median of the seconds it took."""
-    return statistics.median(seconds_of(work) for _ in range(runs))
+def times_of(work: Callable[[], object]) -> tuple[float, float]:
+    """Run `work` once and return the seconds it took, and those of the processor, all threads together."""
+    start = time.process_time()
+    seconds = seconds_of(work)
+    return seconds, time.process_time() - start
+
+
+def median_times(work: Callable[[], object], runs: int) -> tuple[float, float]:
+    """Run `work` several times and return the medians of what `times_of` gives."""
+    seconds, processor_seconds = zip(*(times_of(work) for _ in range(runs)), strict=True)
+    return statistics.median(seconds), statistics.median(processor_seconds)
 
 
 def finite_share(values: npt.ArrayLike) -> float:
@@ -33,13 +41,15 @@ def finite_share(values: npt.ArrayLike) -> float:
 
 
 def report(
-    method: str, points: int, seconds: float, mean_neighbours: float, threads: int, **more: Any
+    method: str, points: int, times: tuple[float, float], mean_neighbours: float, threads: int, **more: Any
 ) -> None:
-    """Print one measurement as a line of JSON."""
+    """Print one measurement, whose times are those of `times_of`, as a line of JSON."""
+    seconds, processor_seconds = times
     measurement = {
         "method": method,
         "points": points,
         "seconds": seconds,
+        "processor_seconds": processor_seconds,
         "points_per_second": points / seconds,
         "mean_neighbours": mean_neighbours,
         "threads": threads,

@@ -92,7 +92,7 @@ impl Extraction {
     }
 
     /// Takes over values from another extraction: (number here, number there).
-    pub(super) fn take_over(&mut self, entries: impl Iterator<Item = (usize, usize)> + Clone, with: &Self) {
+    pub(crate) fn take_over(&mut self, entries: impl Iterator<Item = (usize, usize)> + Clone, with: &Self) {
         let take = Take(entries);
         take.over(&mut self.radii, &with.radii);
         take.over(&mut self.k1, &with.k1);

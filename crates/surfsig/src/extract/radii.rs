@@ -1,6 +1,6 @@
 //! Balls of several radii around every query, in one pass over the points.
 
-use super::{Balls, ExtractOptions, Extraction, Found, Monitor, Neighborhood, Queries, check, run, run_some};
+use super::{Balls, ExtractOptions, Extraction, Found, Monitor, Neighborhood, Queries, check, run};
 use crate::threads::with_threads;
 use crate::{Error, PointCloud, Radius};
 
@@ -73,16 +73,21 @@ pub(super) fn run_group(
         let each = radii.iter().map(|&radius| run_group(cloud, &[radius], queries, options, monitor));
         return each.map(|found| Ok(found?.swap_remove(0))).collect();
     }
-    let largest = radii[0];
+    let Some(&largest) = radii.first() else { return Ok(Vec::new()) };
     let relative: Vec<f64> = radii.iter().map(|radius| radius.get() / largest.get()).collect();
     let balls = Balls { largest, radii: &relative };
     let Found { mut of_balls, left, .. } =
         run(cloud, &balls, Neighborhood::Ball(largest), queries, options, monitor)?;
     if !left.is_empty() {
-        for (&radius, all) in radii.iter().zip(&mut of_balls) {
-            let ball = Neighborhood::Ball(radius);
-            let dense = run_some(cloud, &Balls::one(radius), ball, queries, &left, options, monitor)?;
-            all.take_over(left.iter().copied().zip(0..), &dense.of_balls[0]);
+        // The largest ball alone; the smaller ones may yet be walked together.
+        let some = queries.some(&left);
+        let directions = options.directions_of(&left);
+        let options = ExtractOptions { directions: directions.as_deref(), ..options.clone() };
+        let ball = Neighborhood::Ball(largest);
+        let mut dense = run(cloud, &Balls::one(largest), ball, &some.queries(), &options, monitor)?.of_balls;
+        dense.extend(run_group(cloud, &radii[1..], &some.queries(), &options, monitor)?);
+        for (all, dense) in of_balls.iter_mut().zip(&dense) {
+            all.take_over(left.iter().copied().zip(0..), dense);
         }
     }
     Ok(of_balls)

@@ -19,4 +19,4 @@ pub(crate) use forest::CELLS_PER_REGION;
 pub(crate) const DENSE: usize = 48;
 
 /// The same where several balls around each point are walked at once: the hierarchy walks one at a time.
-pub(crate) const DENSE_FOR_SEVERAL: usize = 4 * DENSE;
+pub(crate) const DENSE_FOR_SEVERAL: usize = 2 * DENSE;

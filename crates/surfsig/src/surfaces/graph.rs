@@ -19,9 +19,8 @@ pub(super) const NOBODY: u32 = u32::MAX;
 /// The nearest neighbours of each point, the nearest first.
 pub(super) struct Graph {
     pub neighbours: Vec<[u32; NEIGHBOURS]>,
-    /// Distances to the first and to the last of them; infinite where there are fewer.
+    /// Distance to the first of them; infinite where there is none.
     pub nearest: Vec<f32>,
-    pub farthest: Vec<f32>,
 }
 
 /// A point, and its neighbours: the square of each distance, and its rank.
@@ -41,12 +40,17 @@ impl BallVisitor for Nearest {
 }
 
 impl Graph {
-    /// Of points within a radius that holds enough for most.
-    pub fn new(positions: &[[f64; 3]], radius: Radius, monitor: &Monitor) -> Result<Self, Error> {
+    /// Of points within a radius that holds enough for most. A point with a stride has every so manieth of its nearest
+    /// points for neighbours.
+    pub fn new(
+        positions: &[[f64; 3]],
+        strides: &[u8],
+        radius: Radius,
+        monitor: &Monitor,
+    ) -> Result<Self, Error> {
         let mut graph = Self {
             neighbours: vec![[NOBODY; NEIGHBOURS]; positions.len()],
             nearest: vec![f32::INFINITY; positions.len()],
-            farthest: vec![f32::INFINITY; positions.len()],
         };
         let mut left: Vec<u32> = (0..positions.len() as u32).collect();
         let mut size = radius.get();
@@ -54,8 +58,9 @@ impl Graph {
             let radius = Radius::new(size)?;
             let index = CellIndex::of_positions(positions.len(), |i| Some(positions[i]), radius, monitor)?;
             let wanted = NEIGHBOURS.min(index.len().saturating_sub(1));
-            let mut asked = vec![false; positions.len()];
-            left.iter().for_each(|&i| asked[i as usize] = true);
+            // Those that are not asked for have no stride.
+            let mut asked = vec![0; positions.len()];
+            left.iter().for_each(|&i| asked[i as usize] = strides[i as usize]);
             graph.fill(&index, &asked, size as f32, monitor)?;
             left.retain(|&i| wanted > 0 && graph.neighbours[i as usize][wanted - 1] == NOBODY);
             if left.is_empty() {
@@ -67,7 +72,7 @@ impl Graph {
     }
 
     /// Looks through the balls of the points that are asked for.
-    fn fill(&mut self, index: &CellIndex, asked: &[bool], size: f32, monitor: &Monitor) -> Result<(), Error> {
+    fn fill(&mut self, index: &CellIndex, asked: &[u8], size: f32, monitor: &Monitor) -> Result<(), Error> {
         let set = InstructionSet::detect();
         let rows: Vec<Vec<Near>> = index
             .rows
@@ -80,9 +85,11 @@ impl Graph {
                     for row in rows {
                         for rank in row.start..row.end {
                             let point = index.point_of_rank[rank];
-                            if !asked[point as usize] {
+                            let stride = usize::from(asked[point as usize]);
+                            if stride == 0 {
                                 continue;
                             }
+                            let most = NEIGHBOURS * stride;
                             let offset = [index.x[rank], index.y[rank], index.z[rank]];
                             walk.enter_row(row.key);
                             walk.enter_run(offset, offset);
@@ -92,12 +99,12 @@ impl Graph {
                             members.retain(|&(_, other)| other as usize != rank);
                             let order =
                                 |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-                            if members.len() > NEIGHBOURS {
-                                members.select_nth_unstable_by(NEIGHBOURS - 1, order);
-                                members.truncate(NEIGHBOURS);
+                            if members.len() > most {
+                                members.select_nth_unstable_by(most - 1, order);
+                                members.truncate(most);
                             }
                             members.sort_unstable_by(order);
-                            found.push((point, members.clone()));
+                            found.push((point, members.iter().copied().step_by(stride).collect()));
                         }
                     }
                     Ok(found)
@@ -111,9 +118,6 @@ impl Graph {
             }
             if let Some((square, _)) = members.first() {
                 self.nearest[point] = size * square.sqrt();
-            }
-            if members.len() == NEIGHBOURS {
-                self.farthest[point] = size * members[NEIGHBOURS - 1].0.sqrt();
             }
         }
         Ok(())

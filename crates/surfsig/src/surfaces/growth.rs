@@ -9,10 +9,10 @@ use super::start::{bent, start};
 const FIRST: usize = 24;
 
 /// Points that a fit looks at while a surface still grows.
-const SAMPLE: usize = 1500;
+const SAMPLE: usize = 800;
 
 /// Points that decide about a kind of surface before it grows.
-const SAMPLE_OF_KIND: usize = 400;
+const SAMPLE_OF_KIND: usize = 200;
 
 /// Standard deviations from the surface at which points belong to it.
 const NEAR: f64 = 3.0;
@@ -23,6 +23,18 @@ const ROUGHEST: f64 = 1.15;
 
 /// A surface whose points stray more, in the same units, is none.
 const ROUGH: f64 = 1.4;
+
+/// A surface with less than this part of the fewest points does not become large by bending.
+const SMALL: usize = 4;
+
+/// A surface with so many points that strays more than noise does is not the right one, and need not grow further.
+const LARGE: usize = 2000;
+
+/// Extent of a curved surface in units of its radius.
+const LEAST_TURN: f64 = 0.15;
+
+/// Rounds after the growth has ended.
+const MAX_SETTLING: usize = 6;
 
 /// Rounds of growing and fitting.
 const MAX_ROUNDS: usize = 30;
@@ -70,24 +82,22 @@ pub(super) struct Grower<'a> {
 }
 
 impl Grower<'_> {
-    /// The surface that grows from a seed, and the points around the seed from which it began.
-    pub fn region_around(&mut self, seed: u32) -> (Option<Region>, Vec<u32>) {
+    /// The surface that grows from a seed where noise is so many times what it seems; or the points that were tried.
+    pub fn region_around(&mut self, seed: u32, level: f64) -> Result<Region, Vec<u32>> {
         let first = self.scene.around(seed, FIRST, self.seen);
-        let noise = self.scene.noise_around(seed, self.seen);
+        let noise = level * self.scene.noise_around(seed, self.seen);
         let mut best: Option<Region> = None;
-        if first.len() < FIRST / 2 || !noise.is_finite() {
-            return (None, first);
+        // Where no quadric explains a place, none of these surfaces does.
+        let rough = noise > NOISELESS * self.scene.floor && self.scene.noise[seed as usize] > 2.0 * noise;
+        if first.len() < FIRST / 2 || !noise.is_finite() || rough {
+            return Err(first);
         }
-        for start in self.first_surfaces(&first, noise) {
-            if let Some(region) = self.grow(start, &first, noise)
-                && best.as_ref().is_none_or(|best| region.is_better_than(best, self.scene))
-            {
-                best = Some(region);
-            }
+        if let Some(start) = self.first_surface(&first, noise) {
+            best = self.grow(start, &first, noise);
         }
         for &kind in self.kinds {
             let Some(simpler) = best.as_ref().filter(|best| best.primitive.kind < kind) else { continue };
-            if simpler.deviation <= self.scene.floor {
+            if simpler.deviation <= self.scene.floor || simpler.members.len() < self.fewest / SMALL {
                 break;
             }
             if let Some(start) = self.more_complex(kind, simpler)
@@ -97,11 +107,15 @@ impl Grower<'_> {
                 best = Some(region);
             }
         }
-        (best.filter(|region| region.is_smooth(self.scene) && region.members.len() >= self.fewest), first)
+        match best {
+            Some(region) if region.is_smooth(self.scene) && region.members.len() >= self.fewest => Ok(region),
+            Some(region) => Err(region.members),
+            None => Err(first),
+        }
     }
 
     /// The simplest surface that explains a seed's first points as well as any.
-    fn first_surfaces(&self, first: &[u32], noise: f64) -> Option<Primitive> {
+    fn first_surface(&self, first: &[u32], noise: f64) -> Option<Primitive> {
         let (points, normals) = self.scene.sample(first, FIRST);
         let mut fits: Vec<(Primitive, f64)> = Vec::new();
         for &kind in self.kinds {
@@ -132,25 +146,30 @@ impl Grower<'_> {
     fn grow(&mut self, start: Primitive, from: &[u32], noise: f64) -> Option<Region> {
         let scene = self.scene;
         let mut region = Region { primitive: start, members: from.to_vec(), deviation: 0.0, noise };
+        let mut settled = 0;
         for _ in 0..MAX_ROUNDS {
             let before = region.members.len();
             region.fit(scene, SAMPLE)?;
+            if before > LARGE && !region.is_smooth(scene) {
+                break;
+            }
             let most = 2 * before;
             let tolerance = region.tolerance(scene);
             let chart = region.primitive.chart();
-            let turned = if noise > NOISELESS * scene.floor { ALONG } else { -1.0 };
-            region.members = scene.reached(&chart, tolerance, turned, &region.members, most, self.seen);
+            let along = if noise > NOISELESS * scene.floor { ALONG } else { -1.0 };
+            region.members = scene.reached(&chart, tolerance, along, &region.members, most, self.seen);
             let after = region.members.len();
             if after < FIRST / 2 {
                 return None;
             }
-            if after < most && after.abs_diff(before) <= after / 500 {
+            settled += usize::from(after < most);
+            if settled >= MAX_SETTLING || after < most && after.abs_diff(before) <= after / 300 {
                 break;
             }
         }
         region.members = scene.largest_part(&region.members, self.seen, self.inside);
         region.fit(scene, SAMPLE)?;
-        Some(region)
+        region.is_bent(scene).then_some(region)
     }
 }
 
@@ -201,6 +220,12 @@ impl Region {
     /// Distance from the surface up to which points belong to it.
     pub fn tolerance(&self, scene: &Scene) -> f64 {
         NEAR * self.deviation.max(0.3 * self.noise).min(ROUGHEST * self.noise) + scene.floor
+    }
+
+    /// Whether it is a plane, or turns enough within its extent to be told from one: no plane is a huge cylinder.
+    fn is_bent(&self, scene: &Scene) -> bool {
+        let (points, _) = scene.sample(&self.members, SAMPLE_OF_KIND);
+        self.primitive.kind == SurfaceKind::Plane || extent(&points) >= LEAST_TURN * self.primitive.radius
     }
 
     /// Whether its points stray no more than noise does.

@@ -4,10 +4,10 @@ use super::primitive::{MOST_PARAMETERS, Primitive, Vector};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Steps after which a fit is given up or taken as it is.
-const MAX_STEPS: usize = 60;
+const MAX_STEPS: usize = 40;
 
 /// A fit has settled where a step gains less than this share of the sum of squares.
-const SETTLED: f64 = 1e-7;
+const SETTLED: f64 = 1e-5;
 
 /// Distances that are nothing, in units of the points' extent.
 const NOTHING: f64 = 1e-12;

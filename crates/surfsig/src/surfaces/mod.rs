@@ -21,6 +21,13 @@ use scene::{NONE, Scene, Stamps};
 /// Seeds of which surfaces begin; of larger clouds not every point is one.
 const MOST_SEEDS: usize = 100_000;
 
+/// Noise in units of what it seems to be among nearest neighbours: first as it seems, then more, for the neighbours in
+/// a scan may err together.
+const LEVELS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+
+/// Failures in which a point takes part until it is no seed any more.
+const TRIES: u8 = 1;
+
 /// How surfaces are found.
 ///
 /// ```
@@ -114,25 +121,26 @@ fn regions(
     let count = scene.points.len();
     let mut seeds: Vec<u32> = (0..count as u32).step_by(count.div_ceil(MOST_SEEDS)).collect();
     seeds.sort_by(|&a, &b| scene.noise[a as usize].total_cmp(&scene.noise[b as usize]));
-    let mut tried = vec![0_u8; count];
     let (mut seen, mut inside) = (Stamps::new(count), Stamps::new(count));
     let mut regions = Vec::new();
-    for seed in seeds {
-        if scene.labels[seed as usize] != NONE || tried[seed as usize] > 1 {
-            continue;
-        }
-        monitor.check()?;
-        let mut grower = Grower { scene, kinds, fewest, seen: &mut seen, inside: &mut inside };
-        let (region, first) = grower.region_around(seed);
-        match region {
-            Some(region) => {
-                monitor.add(region.members.len());
-                for &member in &region.members {
-                    scene.labels[member as usize] = regions.len() as i32;
-                }
-                regions.push(region);
+    for level in LEVELS {
+        let mut tried = vec![0_u8; count];
+        for &seed in &seeds {
+            if scene.labels[seed as usize] != NONE || tried[seed as usize] >= TRIES {
+                continue;
             }
-            None => first.iter().take(12).for_each(|&point| tried[point as usize] += 1),
+            monitor.check()?;
+            let mut grower = Grower { scene, kinds, fewest, seen: &mut seen, inside: &mut inside };
+            match grower.region_around(seed, level) {
+                Ok(region) => {
+                    monitor.add(region.members.len());
+                    for &member in &region.members {
+                        scene.labels[member as usize] = regions.len() as i32;
+                    }
+                    regions.push(region);
+                }
+                Err(members) => members.into_iter().for_each(|point| tried[point as usize] += 1),
+            }
         }
     }
     Ok(regions)

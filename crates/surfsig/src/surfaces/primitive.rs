@@ -111,7 +111,7 @@ impl Chart {
                 match p.kind {
                     SurfaceKind::Cylinder => away - p.radius,
                     SurfaceKind::Cone => (away - p.radius) * self.cosine - height * self.sine,
-                    _ => (away - p.major_radius).hypot(height) - p.radius,
+                    _ => length(away - p.major_radius, height) - p.radius,
                 }
             }
         }
@@ -153,7 +153,7 @@ impl Chart {
             return (length - p.radius, by);
         }
         let height = from.dot(&p.axis);
-        let away = along[0].hypot(along[1]);
+        let away = length(along[0], along[1]);
         let outward = along.map(|a| a / away.max(f64::MIN_POSITIVE));
         // The distance, and its derivatives by the distance from the axis and by the height.
         let (distance, by_away, by_height) = match p.kind {
@@ -163,7 +163,7 @@ impl Chart {
             }
             _ => {
                 let (across, up) = (away - p.major_radius, height);
-                let length = across.hypot(up).max(f64::MIN_POSITIVE);
+                let length = length(across, up).max(f64::MIN_POSITIVE);
                 (length - p.radius, across / length, up / length)
             }
         };
@@ -210,6 +210,11 @@ impl Chart {
         }
         p
     }
+}
+
+/// By a square root: these lengths are far from where a square overflows, and `hypot` takes ten times as long.
+fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
 }
 
 #[cfg(test)]

@@ -9,6 +9,12 @@ use crate::{Error, ExtractOptions, Monitor, Neighborhood, PointCloud, Queries, R
 /// Nearest points to which a surface is fitted for a point's normal and noise.
 const LOCAL: usize = 24;
 
+/// Linearity of the nearest points from which they are a scanner's line, ...
+const LINE: f64 = 0.9;
+
+/// ... and so many times as many points are looked at.
+const ACROSS: u8 = 5;
+
 /// Distances that tell nothing, in typical distances between points.
 const FLOOR: f64 = 1e-4;
 
@@ -50,10 +56,19 @@ impl Scene {
         // A quadric, for a paraboloid's bias would seem to be noise.
         let options = ExtractOptions { fit: FitKind::Quadric, ..Default::default() };
         let nearest = Neighborhood::Nearest(LOCAL);
-        let local = extract_within(&finite, nearest, &Queries::All, &options, &monitor.apart())?;
+        let mut local = extract_within(&finite, nearest, &Queries::All, &options, &monitor.apart())?;
+        // On a line of a lidar the nearest points tell nothing across it.
+        let on_lines: Vec<u32> =
+            (0..positions.len() as u32).filter(|&i| f64::from(local.linearity[i as usize]) > LINE).collect();
+        let more = Neighborhood::Nearest(LOCAL * usize::from(ACROSS));
+        let queries = Queries::Indices(&on_lines);
+        let wider = extract_within(&finite, more, &queries, &options, &monitor.apart())?;
+        local.take_over(on_lines.iter().map(|&i| i as usize).zip(0..), &wider);
+        let mut strides = vec![1_u8; positions.len()];
+        on_lines.iter().for_each(|&i| strides[i as usize] = ACROSS);
         let typical = middle(local.radii.iter().map(|&r| f64::from(r)).filter(|r| *r > 0.0).collect());
         let Some(typical) = typical else { return Ok(None) };
-        let graph = Graph::new(&positions, Radius::new(typical)?, monitor)?;
+        let graph = Graph::new(&positions, &strides, Radius::new(typical)?, monitor)?;
         let spacing = middle(graph.nearest.iter().map(|&d| f64::from(d)).filter(|d| d.is_finite()).collect());
         let count = positions.len() as f64;
         let origin = positions.iter().map(|p| Vector::from(*p)).sum::<Vector>() / count;
