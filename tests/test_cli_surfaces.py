@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import surface_scenes
 from conftest import Finished
+from surface_points import Array
 from test_cli_errors import one_line
 
 import surfsig
@@ -89,7 +90,7 @@ def test_options_reach_the_search(shell: Shell, scan: Path) -> None:
         (np.linspace(0, 1, 300)[:, None] * [1, 2, 3], "of 300 points too few lie on any one surface"),
     ],
 )
-def test_nothing_found_is_said(shell: Shell, tmp_path: Path, points: surface_scenes.Array, why: str) -> None:
+def test_nothing_found_is_said(shell: Shell, tmp_path: Path, points: Array, why: str) -> None:
     path = tmp_path / "scan.ply"
     surfsig.write(path, PointCloud(points))
     finished = shell("surfaces", path, "-o", tmp_path / "out.ply", "--json", tmp_path / "out.json")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import surface_scenes
-from surface_points import UTM
+from surface_points import UTM, Array
 
 import surfsig
 from surfsig import PointCloud
@@ -30,7 +30,7 @@ def drawn(page: Path) -> str:
 
 
 @pytest.mark.parametrize("origin", [np.zeros(3), UTM])
-def test_a_browser_draws_the_page(tmp_path: Path, origin: surface_scenes.Array) -> None:
+def test_a_browser_draws_the_page(tmp_path: Path, origin: Array) -> None:
     found = surfsig.surfaces(PointCloud(surface_scenes.on_a_plane().points, origin))
     page = tmp_path / "report.html"
     found.write_report(page, title="a < b & c")
