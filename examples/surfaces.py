@@ -14,7 +14,9 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
+from PIL import Image
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -25,7 +27,7 @@ from surfsig import PointCloud, plot
 CAMERA = ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))
 """Seen from where the camera stood: its x to the right, its y down, its z away."""
 
-PARTS = ("PC30", "PC101", "PC44")
+PARTS = ("PC101", "PC44")
 """Clouds of the benchmark Fit4CAD."""
 
 
@@ -58,15 +60,18 @@ def main(folder: Path, picture: Path) -> None:
             file = Path(scratch) / f"{name}.ply"
             surfsig.write(file, read_part(folder / "primitives" / "fit4cad" / f"{name}.txt"))
             draw(ax, labelled(file), plot.view_axes(-60.0, 30.0), f"{name} (Fit4CAD)")
-    figure.savefig(picture, dpi=90)
+    figure.savefig(picture, dpi=80)
+    # Few colours: a small file.
+    with Image.open(picture) as drawn:
+        drawn.convert("RGB").quantize(64, dither=Image.Dither.NONE).save(picture, optimize=True)
 
 
-def draw(ax: plt.Axes, cloud: PointCloud, view: NDArray[np.float64], title: str) -> None:
+def draw(ax: Axes, cloud: PointCloud, view: NDArray[np.float64], title: str) -> None:
     """Draw a labelled cloud in its surfaces' colours, the nearest points in front."""
     colors = np.column_stack([cloud.fields[name] for name in ("red", "green", "blue")]) / 255
     seen = cloud.points @ view.T
     order = np.argsort(seen[:, 2])
-    ax.scatter(seen[order, 0], seen[order, 1], s=1.5, c=colors[order], linewidths=0, rasterized=True)
+    ax.scatter(seen[order, 0], seen[order, 1], s=4, c=colors[order], linewidths=0, rasterized=True)
     ax.set_aspect("equal")
     ax.set_axis_off()
     found = len(np.unique(cloud.fields["surface"][cloud.fields["surface"] >= 0]))
