@@ -13,7 +13,7 @@ import pytest
 
 import surfsig
 
-COMMANDS = ("info", "extract", "fit", "compare", "convert", "completion")
+COMMANDS = ("info", "extract", "fit", "surfaces", "compare", "convert", "completion")
 
 
 def one_line(finished: Any) -> str:
