@@ -10,6 +10,7 @@ from surface_points import UTM, rotation
 
 import surfsig
 from surfsig import InvalidInputError, PointCloud, Surfaces
+from surfsig.surfaces.surface import described
 
 
 def agreement(found: Surfaces, owners: NDArray[np.intp]) -> float:
@@ -211,3 +212,27 @@ def test_only_some_kinds(scene: surface_scenes.Known) -> None:
 def test_arguments_without_a_meaning(scene: surface_scenes.Known, wrong: dict[str, float]) -> None:
     with pytest.raises(InvalidInputError, match=next(iter(wrong))):
         surfsig.surfaces(scene.points, **wrong)  # type: ignore[arg-type]
+
+
+def test_the_errors_of_the_core_are_given_on() -> None:
+    """A sphere as the core may describe it: the interval is Student's."""
+    rng = np.random.default_rng(14)
+    towards = rng.normal(size=(500, 3))
+    towards /= np.linalg.norm(towards, axis=1)[:, None]
+    nothing = {"axis": np.full(3, np.nan), "major_radius": np.nan, "half_angle": np.nan}
+    core = {"kind": "sphere", "point": UTM, "radius": 2.0, "deviation": 0.1, "count": 500, **nothing}
+    errors = {"radius_std": 0.01, "freedom": 10.0, "covariance": np.diag([1e-4, 1e-4, 1e-4, 1e-4])}
+    sphere = described({**core, **errors}, 2.1 * towards, UTM)
+    # t of 10 degrees of freedom at 0.975.
+    assert sphere.interval == pytest.approx((2 - 0.0222814, 2 + 0.0222814), abs=1e-6)
+    assert sphere.rms == pytest.approx(0.1)
+    assert sphere.area == pytest.approx(4 * np.pi * 2**2, rel=0.08)
+    np.testing.assert_array_equal(sphere.covariance, errors["covariance"])
+    (row,) = Surfaces(PointCloud(2.1 * towards, UTM), np.zeros(500, np.int32), [sphere]).table()[1]
+    assert row[2:4] == ("2.000", "1.978 to 2.022")
+    assert sphere.values()["interval"] == sphere.interval
+    assert "major_radius" not in sphere.values()
+    without = described(core, 2.1 * towards, UTM)
+    assert math.isnan(without.radius_std)
+    assert without.covariance.shape == (4, 4)
+    assert np.isnan(without.covariance).all()

@@ -66,3 +66,25 @@ def test_a_page_without_surfaces(tmp_path: Path) -> None:
     surfsig.surfaces(np.full((9, 3), np.nan)).write_report(tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "no surface found: of 9 points none is finite" in text
+
+
+@pytest.mark.parametrize(
+    "click", ["rows[1].click()", "view.emit('plotly_click', {points: [{data: {meta: 1}}]})"]
+)
+def test_a_click_marks_the_surface(tmp_path: Path, click: str) -> None:
+    page = tmp_path / "report.html"
+    surfsig.surfaces(surface_scenes.on_a_plane().points).write_report(page)
+    script = (
+        "const places = () => view.data.map(trace => trace.marker.size).join(' ');"
+        f"setTimeout(() => {{ {click}; document.title = places(); }}, 2000);"
+    )
+    text = page.read_text(encoding="utf-8")
+    marked = text.replace(
+        "rows.forEach((row, i) => row.addEventListener",
+        f"{script}\nrows.forEach((row, i) => row.addEventListener",
+    )
+    assert marked != text
+    page.write_text(marked, encoding="utf-8")
+    shown = drawn(page)
+    assert "<title>1.6 4 1.6 1.6</title>" in shown
+    assert re.findall(r'<tr class="chosen">.*?<td>(\w+)</td>', shown) == ["cylinder"]

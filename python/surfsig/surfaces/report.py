@@ -32,9 +32,9 @@ tr.chosen { background: #ffeeb0; }
 i { display: inline-block; width: 0.8em; height: 0.8em; border-radius: 50%; }
 """
 
-# A click on a point or a row marks the row and makes the surface's points larger.
+# A click on a point or a row marks the row and makes the surface's points larger. It comes behind the table.
 _SCRIPT = """
-const view = document.getElementById('{plot_id}');
+const view = document.getElementById('view');
 const rows = document.querySelectorAll('#surfaces tbody tr');
 function choose(number, scroll) {
   rows.forEach((row, i) => row.classList.toggle('chosen', i === number));
@@ -67,7 +67,6 @@ def page(found: Surfaces, title: str) -> str:
         full_html=False,
         include_plotlyjs=True,
         div_id="view",
-        post_script=_SCRIPT,
         config={"responsive": True},
     )
     return (
@@ -75,7 +74,7 @@ def page(found: Surfaces, title: str) -> str:
         f"<title>{html.escape(title)}</title><style>{_STYLE}</style></head>\n<body>\n"
         f"<h1>{html.escape(title)}</h1>\n<p>{html.escape(found.summary())}. Lengths are in the scan's unit; "
         f"a click on a point or a row shows the surface.</p>\n"
-        f'<div class="view">{view}</div>\n{_table(found)}\n</body>\n</html>\n'
+        f'<div class="view">{view}</div>\n{_table(found)}\n<script>{_SCRIPT}</script>\n</body>\n</html>\n'
     )
 
 
