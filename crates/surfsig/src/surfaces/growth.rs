@@ -5,8 +5,11 @@ use super::primitive::{Primitive, SurfaceKind, Vector};
 use super::scene::{Scene, Stamps};
 use super::start::{bent, start};
 
-/// Points around a seed from which a surface begins.
-const FIRST: usize = 24;
+/// Points that every surface has.
+const FEW: usize = 12;
+
+/// Points that tell which surface goes through a seed's first points.
+const SAMPLE_OF_FIRST: usize = 48;
 
 /// Points that a fit looks at while a surface still grows.
 const SAMPLE: usize = 800;
@@ -77,19 +80,21 @@ pub(super) struct Grower<'a> {
     pub scene: &'a Scene,
     pub kinds: &'a [SurfaceKind],
     pub fewest: usize,
+    /// Points around a seed from which a surface begins.
+    pub first: usize,
     pub seen: &'a mut Stamps,
     pub inside: &'a mut Stamps,
 }
 
 impl Grower<'_> {
-    /// The surface that grows from a seed where noise is so many times what it seems; or the points that were tried.
-    pub fn region_around(&mut self, seed: u32, level: f64) -> Result<Region, Vec<u32>> {
-        let first = self.scene.around(seed, FIRST, self.seen);
-        let noise = level * self.scene.noise_around(seed, self.seen);
+    /// The surface that grows from a seed or the points that were tried.
+    pub fn region_around(&mut self, seed: u32) -> Result<Region, Vec<u32>> {
+        let first = self.scene.around(seed, self.first, self.seen);
+        let noise = self.scene.noise_around(seed, self.seen);
         let mut best: Option<Region> = None;
         // Where no quadric explains a place, none of these surfaces does.
         let rough = noise > NOISELESS * self.scene.floor && self.scene.noise[seed as usize] > 2.0 * noise;
-        if first.len() < FIRST / 2 || !noise.is_finite() || rough {
+        if first.len() < self.first / 2 || !noise.is_finite() || rough {
             return Err(first);
         }
         if let Some(start) = self.first_surface(&first, noise) {
@@ -116,7 +121,7 @@ impl Grower<'_> {
 
     /// The simplest surface that explains a seed's first points as well as any.
     fn first_surface(&self, first: &[u32], noise: f64) -> Option<Primitive> {
-        let (points, normals) = self.scene.sample(first, FIRST);
+        let (points, normals) = self.scene.sample(first, SAMPLE_OF_FIRST);
         let mut fits: Vec<(Primitive, f64)> = Vec::new();
         for &kind in self.kinds {
             let simpler = fits.iter().map(|(primitive, _)| *primitive).collect::<Vec<_>>();
@@ -159,7 +164,7 @@ impl Grower<'_> {
             let along = if noise > NOISELESS * scene.floor { ALONG } else { -1.0 };
             region.members = scene.reached(&chart, tolerance, along, &region.members, most, self.seen);
             let after = region.members.len();
-            if after < FIRST / 2 {
+            if after < FEW {
                 return None;
             }
             settled += usize::from(after < most);

@@ -16,14 +16,14 @@ pub use primitive::SurfaceKind;
 
 use crate::{Error, Monitor, PointCloud, with_threads};
 use growth::{Grower, Region};
-use scene::{NONE, Scene, Stamps};
+use scene::{LOCAL, NONE, Scene, Stamps};
 
 /// Seeds of which surfaces begin; of larger clouds not every point is one.
 const MOST_SEEDS: usize = 100_000;
 
-/// Noise in units of what it seems to be among nearest neighbours: first as it seems, then more, for the neighbours in
-/// a scan may err together.
-const LEVELS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+/// Nearest points by which noise and normals are judged: first few, then more where no surface was found, for the
+/// neighbours in a scan may err together.
+const LEVELS: [usize; 3] = [LOCAL, 4 * LOCAL, 16 * LOCAL];
 
 /// Failures in which a point takes part until it is no seed any more.
 const TRIES: u8 = 1;
@@ -119,19 +119,24 @@ fn regions(
     monitor: &Monitor,
 ) -> Result<Vec<Region>, Error> {
     let count = scene.points.len();
-    let mut seeds: Vec<u32> = (0..count as u32).step_by(count.div_ceil(MOST_SEEDS)).collect();
-    seeds.sort_by(|&a, &b| scene.noise[a as usize].total_cmp(&scene.noise[b as usize]));
     let (mut seen, mut inside) = (Stamps::new(count), Stamps::new(count));
     let mut regions = Vec::new();
     for level in LEVELS {
+        if level > LOCAL {
+            scene.look_farther(level, monitor)?;
+        }
+        let left = (0..count as u32).filter(|&point| scene.labels[point as usize] == NONE);
+        let mut seeds: Vec<u32> = left.step_by(count.div_ceil(MOST_SEEDS)).collect();
+        seeds.sort_by(|&a, &b| scene.noise[a as usize].total_cmp(&scene.noise[b as usize]));
         let mut tried = vec![0_u8; count];
-        for &seed in &seeds {
+        for seed in seeds {
             if scene.labels[seed as usize] != NONE || tried[seed as usize] >= TRIES {
                 continue;
             }
             monitor.check()?;
-            let mut grower = Grower { scene, kinds, fewest, seen: &mut seen, inside: &mut inside };
-            match grower.region_around(seed, level) {
+            let mut grower =
+                Grower { scene, kinds, fewest, first: level, seen: &mut seen, inside: &mut inside };
+            match grower.region_around(seed) {
                 Ok(region) => {
                     monitor.add(region.members.len());
                     for &member in &region.members {

@@ -4,10 +4,10 @@ use super::graph::{Graph, NEIGHBOURS};
 use super::primitive::{Chart, Vector};
 use crate::extract::extract_within;
 use crate::fit::{FitKind, FitUsed};
-use crate::{Error, ExtractOptions, Monitor, Neighborhood, PointCloud, Queries, Radius};
+use crate::{Error, ExtractOptions, Extraction, Monitor, Neighborhood, PointCloud, Queries, Radius};
 
 /// Nearest points to which a surface is fitted for a point's normal and noise.
-const LOCAL: usize = 24;
+pub(super) const LOCAL: usize = 24;
 
 /// Linearity of the nearest points from which they are a scanner's line, ...
 const LINE: f64 = 0.9;
@@ -35,6 +35,8 @@ pub(super) struct Scene {
     pub origin: Vector,
     /// Normals of the surfaces through the nearest points; not a number where there is none.
     pub normals: Vec<Vector>,
+    /// Noise that somebody knows.
+    known: Option<f64>,
     /// Standard deviations of the nearest points from those surfaces; infinite where there is none.
     pub noise: Vec<f64>,
     pub graph: Graph,
@@ -53,16 +55,13 @@ impl Scene {
             return Ok(None);
         }
         let finite = PointCloud::new_f64(&positions);
-        // A quadric, for a paraboloid's bias would seem to be noise.
-        let options = ExtractOptions { fit: FitKind::Quadric, ..Default::default() };
-        let nearest = Neighborhood::Nearest(LOCAL);
-        let mut local = extract_within(&finite, nearest, &Queries::All, &options, &monitor.apart())?;
+        let queries = Queries::All;
+        let mut local = around(&finite, LOCAL, &queries, &monitor.apart())?;
         // On a line of a lidar the nearest points tell nothing across it.
         let on_lines: Vec<u32> =
-            (0..positions.len() as u32).filter(|&i| f64::from(local.linearity[i as usize]) > LINE).collect();
-        let more = Neighborhood::Nearest(LOCAL * usize::from(ACROSS));
-        let queries = Queries::Indices(&on_lines);
-        let wider = extract_within(&finite, more, &queries, &options, &monitor.apart())?;
+            (0..positions.len() as u32).filter(|&i| is_line(&local, i as usize)).collect();
+        let wider =
+            around(&finite, LOCAL * usize::from(ACROSS), &Queries::Indices(&on_lines), &monitor.apart())?;
         local.take_over(on_lines.iter().map(|&i| i as usize).zip(0..), &wider);
         let mut strides = vec![1_u8; positions.len()];
         on_lines.iter().for_each(|&i| strides[i as usize] = ACROSS);
@@ -73,24 +72,44 @@ impl Scene {
         let count = positions.len() as f64;
         let origin = positions.iter().map(|p| Vector::from(*p)).sum::<Vector>() / count;
         let points: Vec<Vector> = positions.iter().map(|p| Vector::from(*p) - origin).collect();
-        let known = noise;
-        let noise = (0..points.len()).map(|i| {
-            let unknowns = if local.fit_used[i] == FitUsed::Quadric { 9.0 } else { 6.0 };
-            let freedom = f64::from(local.count[i]) - unknowns;
-            let noise = f64::from(local.residual[i]) * (f64::from(local.count[i]) / freedom).sqrt();
-            if freedom > 0.0 && noise.is_finite() { known.unwrap_or(noise) } else { f64::INFINITY }
-        });
         let spacing = spacing.unwrap_or(0.0).max(1e-2 * typical);
-        Ok(Some(Self {
-            noise: noise.collect(),
-            normals: local.normals.iter().map(|n| Vector::from(n.map(f64::from))).collect(),
+        let mut scene = Self {
+            known: noise,
+            noise: vec![f64::INFINITY; points.len()],
+            normals: vec![Vector::repeat(f64::NAN); points.len()],
             labels: vec![NONE; points.len()],
             points,
             numbers,
             origin,
             graph,
             floor: FLOOR * spacing,
-        }))
+        };
+        scene.learn(&local, 0..scene.points.len());
+        Ok(Some(scene))
+    }
+
+    /// Looks at so many nearest points of each that has no label.
+    pub fn look_farther(&mut self, neighbours: usize, monitor: &Monitor) -> Result<(), Error> {
+        let positions: Vec<[f64; 3]> = self.points.iter().map(|p| (*p).into()).collect();
+        let left = (0..self.points.len() as u32).filter(|&i| self.labels[i as usize] == NONE);
+        let left: Vec<u32> = left.collect();
+        let cloud = PointCloud::new_f64(&positions);
+        let local = around(&cloud, neighbours, &Queries::Indices(&left), &monitor.apart())?;
+        self.learn(&local, left.iter().map(|&i| i as usize));
+        Ok(())
+    }
+
+    /// Takes over normals and noise of some points.
+    fn learn(&mut self, local: &Extraction, points: impl Iterator<Item = usize>) {
+        for (entry, point) in points.enumerate() {
+            let unknowns = if local.fit_used[entry] == FitUsed::Quadric { 9.0 } else { 6.0 };
+            let freedom = f64::from(local.count[entry]) - unknowns;
+            let noise = f64::from(local.residual[entry]) * (f64::from(local.count[entry]) / freedom).sqrt();
+            let known = freedom > 0.0 && noise.is_finite() && !is_line(local, entry);
+            self.noise[point] = if known { self.known.unwrap_or(noise) } else { f64::INFINITY };
+            let normal = local.normals[entry].map(f64::from);
+            self.normals[point] = if known { Vector::from(normal) } else { Vector::repeat(f64::NAN) };
+        }
     }
 
     /// The first unlabelled points that are found from one on, over neighbours: at most so many.
@@ -189,10 +208,29 @@ impl Scene {
             around.extend(self.graph.of(around[next]).filter(|&other| seen.set(other)));
             next += 1;
         }
-        let mut noise: Vec<f64> = around.iter().map(|&other| self.noise[other as usize]).collect();
+        let noise = around.iter().map(|&other| self.noise[other as usize]);
+        let mut noise: Vec<f64> = noise.filter(|noise| noise.is_finite()).collect();
+        if noise.is_empty() {
+            return f64::INFINITY;
+        }
         let quarter = noise.len() / 4;
         QUARTER * *noise.select_nth_unstable_by(quarter, f64::total_cmp).1
     }
+}
+
+/// Surfaces through so many nearest points; quadrics, for a paraboloid's bias would seem to be noise.
+fn around(
+    cloud: &PointCloud<'_>,
+    neighbours: usize,
+    queries: &Queries<'_>,
+    monitor: &Monitor,
+) -> Result<Extraction, Error> {
+    let options = ExtractOptions { fit: FitKind::Quadric, ..Default::default() };
+    extract_within(cloud, Neighborhood::Nearest(neighbours), queries, &options, monitor)
+}
+
+fn is_line(local: &Extraction, entry: usize) -> bool {
+    f64::from(local.linearity[entry]) > LINE
 }
 
 /// The median, or `None` of nothing.
