@@ -26,7 +26,6 @@ def test_the_mug(shared_data: Path) -> None:
     assert mug.count > 1000
 
 
-@pytest.mark.xfail(reason=NOISY)
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_the_lidar_sphere(shared_data: Path, number: int) -> None:
     sphere = found_in(shared_data / "surfaces" / f"lidar_sphere_{number}.xyz", "sphere", 0.295)
