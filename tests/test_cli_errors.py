@@ -13,7 +13,7 @@ import pytest
 
 import surfsig
 
-COMMANDS = ("info", "extract", "fit", "compare", "convert", "completion")
+COMMANDS = ("info", "extract", "fit", "surfaces", "compare", "convert", "completion")
 
 
 def one_line(finished: Any) -> str:
@@ -62,7 +62,7 @@ def test_radii(shell: Callable[..., Any], ball: Path, tmp_path: Path, radius: st
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--radius", "wide"), "'wide' is not a valid float"),
+        (("--radius", "wide"), "must be a number, or auto, not 'wide'"),
         ((), "give a radius, or neighbors, or both"),
         (("--radius", 1, "--at", "1;2;3"), "not three numbers"),
         (("--radius", 1, "--at", "1,2,3", "--voxel", 1), "exclude each other"),

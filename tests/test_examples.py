@@ -85,6 +85,15 @@ def test_real_scans(shared_data: Path, tmp_path: Path) -> None:
     assert picture.stat().st_size > 50_000
 
 
+def test_surfaces(shared_data: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    picture = tmp_path / "surfaces.png"
+    lines = run(EXAMPLES / "surfaces.py", shared_data, picture)
+    # Fit4CAD says 39.6875 for the largest cylinder of PC101.
+    assert any(re.match(r"0 +cylinder +39\.68[78]", line) for line in lines)
+    assert picture.stat().st_size > 30_000
+
+
 def test_real_classes(shared_data: Path, tmp_path: Path) -> None:
     """The table of docs/zeta.md: right decisions, in percent, without a flat atom and with either length."""
     pytest.importorskip("matplotlib")

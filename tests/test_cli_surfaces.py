@@ -1,0 +1,116 @@
+"""`surfsig surfaces`: a table for a person, JSON for a program, colours for a viewer."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import surface_scenes
+from conftest import Finished
+from surface_points import Array
+from test_cli_errors import one_line
+
+import surfsig
+from surfsig import PointClass, PointCloud
+
+Shell = Callable[..., Finished]
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("surfaces") / "scan.ply"
+    surfsig.write(path, PointCloud(surface_scenes.on_a_plane().points))
+    return path
+
+
+def test_a_table(shell: Shell, scan: Path) -> None:
+    finished = shell("surfaces", scan)
+    assert (finished.code, finished.err) == (0, "")
+    title, header, *rows = finished.out.splitlines()
+    assert title.startswith(f"{scan}: 3 surfaces: 1 plane, 1 cylinder, 1 sphere; 99")
+    assert header.split()[:3] == ["kind", "radius", "95"]
+    assert [row.split()[:2] for row in rows] == [["0", "plane"], ["1", "cylinder"], ["2", "sphere"]]
+    assert float(rows[1].split()[2]) == pytest.approx(0.2, rel=1e-3)
+    assert "0.799 long, 359° round" in rows[1]
+    assert shell("surfaces", scan, "--quiet").out == ""
+
+
+def test_json(shell: Shell, scan: Path, tmp_path: Path) -> None:
+    finished = shell("surfaces", scan, "--json", "-")
+    values = json.loads(finished.out)
+    expected = surfsig.surfaces(surfsig.read(scan))
+    assert values["points"] == len(expected.cloud)
+    assert values["classes"]["sphere"] == expected[2].count
+    assert sum(values["classes"].values()) == len(expected.cloud)
+    floor, pipe, ball = values["surfaces"]
+    assert (floor["kind"], floor["number"]) == ("plane", 0)
+    assert "radius" not in floor
+    assert "axis" not in ball
+    assert ball["center"] == expected[2].center.tolist()
+    assert pipe["radius"] == expected[1].radius
+    file = tmp_path / "surfaces.json"
+    shell("surfaces", scan, "--json", file)
+    assert json.loads(file.read_text()) == values
+
+
+@pytest.mark.parametrize("ending", ["ply", "pcd", "npz", "las"])
+def test_a_labelled_file(shell: Shell, scan: Path, tmp_path: Path, ending: str) -> None:
+    output = tmp_path / f"labelled.{ending}"
+    assert shell("surfaces", scan, "-o", output).code == 0
+    labelled = surfsig.read(output)
+    found = surfsig.surfaces(surfsig.read(scan))
+    np.testing.assert_array_equal(labelled.fields["surface"], found.labels)
+    np.testing.assert_array_equal(labelled.fields["point_class"], found.classes)
+    np.testing.assert_array_equal(labelled.fields["confidence"], found.confidence)
+    kinds = labelled.fields["surface_kind"]
+    assert set(np.unique(kinds[found.labels == 2])) == {PointClass.SPHERE}
+    if ending in ("ply", "pcd"):
+        colors = np.column_stack([labelled.fields[name] for name in ("red", "green", "blue")])
+        np.testing.assert_array_equal(colors, found.colors)
+
+
+def test_options_reach_the_search(shell: Shell, scan: Path) -> None:
+    values = json.loads(
+        shell("surfaces", scan, "--json", "-", "--kinds", "plane,sphere", "--min-points", 2500).out
+    )
+    cloud = surfsig.read(scan)
+    expected = surfsig.surfaces(cloud, kinds=["plane", "sphere"], min_points=2500)
+    assert [entry["count"] for entry in values["surfaces"]] == [surface.count for surface in expected]
+    millimetres = json.loads(shell("surfaces", scan, "--json", "-", "--unit", "mm").out)["surfaces"]
+    assert millimetres[2]["radius"] == pytest.approx(0.0003, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("points", "why"),
+    [
+        (np.zeros((0, 3)), "there are no points"),
+        (np.full((50, 3), np.nan), "of 50 points none is finite"),
+        (np.eye(3)[:2], "2 points are too few"),
+        (np.linspace(0, 1, 300)[:, None] * [1, 2, 3], "of 300 points too few lie on any one surface"),
+    ],
+)
+def test_nothing_found_is_said(shell: Shell, tmp_path: Path, points: Array, why: str) -> None:
+    path = tmp_path / "scan.ply"
+    surfsig.write(path, PointCloud(points))
+    finished = shell("surfaces", path, "-o", tmp_path / "out.ply", "--json", tmp_path / "out.json")
+    assert (finished.code, finished.out) == (0, "")
+    assert finished.err.startswith(f"surfsig: warning: {path}: no surface found: {why}")
+    assert finished.err.count("\n") == 1
+    assert len(surfsig.read(tmp_path / "out.ply")) == len(points)
+    assert json.loads((tmp_path / "out.json").read_text())["surfaces"] == []
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--kinds", "plane,ball"), "kinds must be of plane, sphere, cylinder, cone, torus, not 'ball'"),
+        (("--noise", "0"), "noise must be a finite number above 0"),
+        (("--min-points", "0"), "min_points must be 1 to"),
+        (("-o", "scan.jpg"), "scan.jpg"),
+        (("--json", "nowhere/out.json"), "nowhere/out.json: No such file or directory"),
+        (("--report", "nowhere/out.html"), "nowhere/out.html: No such file or directory"),
+    ],
+)
+def test_mistakes(shell: Shell, scan: Path, options: tuple[str, str], message: str) -> None:
+    assert message in one_line(shell("surfaces", scan, *options))
