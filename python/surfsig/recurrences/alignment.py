@@ -6,99 +6,94 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from surfsig.recurrences.point_pairs import proposed_poses
-from surfsig.recurrences.sight import Sight
+from surfsig.recurrences.view import View
 
 Array = NDArray[np.float64]
 
-_PROPOSALS = 2000
-_COARSE_POINTS = 60
-_KEPT = 8
-_MUTATIONS = 32
-_ROUNDS = 7
-_PENALTY = 2.0
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """A piece as the alignment takes it: evenly thinned points and normals, fewer ones for pairs, its sight."""
-
-    points: Array
-    normals: Array
-    pairs: tuple[Array, Array]
-    sight: Sight
-    extent: float
+_PROPOSALS = 3000
+_FEW, _SOME, _MANY = 60, 240, 600
+"""Points of each piece that poses are judged by, from the first proposals to the last search."""
+_TRIED, _KEPT = 48, 12
+_MUTATIONS = 24
+_TURN, _SHIFT = 0.15, 0.06
+"""Of the first random changes: radians, and parts of the piece's extent; halved each round."""
+_COARSE_ROUNDS, _FINE_ROUNDS = 4, 6
+_SETTLING = 5
+_PENALTY, _VETO = 4.0, 15.0
+"""What a place counts where the sensor saw through the object, in confirmed places: at first, when even the
+best poses are not exact; and in the end, when hardly any is left on true ones."""
+_HOPELESS = 0.1
+"""Scores after the coarse search below which no fine one made a match."""
 
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
     """How well one piece lies on another.
 
-    `pose` is T_target_source (4, 4). `confirmed`, `contradicted` and `astray` are shares of points: of the
-    source's points as the target's sensor sees them, and the other way round, (2,).
+    `confirmed`, `contradicted` and `astray` are shares of points: of the source's as the target's sensor sees
+    them, and the other way round, (2,).
     """
 
     pose: Array
+    """T_target_source, (4, 4)."""
     confirmed: Array
     contradicted: Array
     astray: Array
     score: float
+    """1 where all is seen from both sides and agrees; 0 and below where nothing speaks for a match."""
 
 
-def align(source: View, target: View, tolerance: float, rng: np.random.Generator) -> Alignment | None:
-    """Find the pose T_target_source that most of both pieces agree with; None if no pose is proposed."""
-    length = max(source.extent, target.extent) / 10.0
-    poses = proposed_poses(source.pairs, target.pairs, length, _PROPOSALS, rng)
+def align(source: View, target: View, rng: np.random.Generator) -> Alignment | None:
+    """Find the pose T_target_source that both pieces agree with most; None where that is hopeless."""
+    poses = proposed_poses(source.pairs, target.pairs, _PROPOSALS, rng)
     if not len(poses):
         return None
-    few = _some(source, rng), _some(target, rng)
-    score = _scores(poses, few, (source.sight, target.sight), tolerance * 2.0)
-    poses, score = _best(poses, score, 4 * _KEPT)
-    many = _some(source, rng, 4 * _COARSE_POINTS), _some(target, rng, 4 * _COARSE_POINTS)
-    score = _scores(poses, many, (source.sight, target.sight), tolerance)
-    poses, score = _best(poses, score, _KEPT)
-    middle = target.points.mean(axis=0)
-    for turn in range(_ROUNDS):
-        step = 0.5**turn
-        tried = _mutated(poses, middle, 0.15 * step, 0.06 * step * target.extent, rng)
-        tried = np.concatenate([poses, tried])
-        score = _scores(tried, many, (source.sight, target.sight), tolerance)
-        poses, score = _best(tried, score, max(1, _KEPT >> (turn // 2)))
-    return measured(poses[0], source, target, tolerance)
+    few = (source.sample(_FEW), target.sample(_FEW))
+    poses, _ = _best(poses, _scores(poses, few, 2.0, _PENALTY), _TRIED)
+    some = (source.sample(_SOME), target.sample(_SOME))
+    poses, score = _best(poses, _scores(poses, some, 1.0, _PENALTY), _KEPT)
+    for number in range(_COARSE_ROUNDS):
+        poses = _mutated(poses, target, 0.5**number, rng)
+        poses, score = _best(poses, _scores(poses, some, 1.0, _PENALTY), _KEPT)
+    if score[0] < _HOPELESS:
+        return None
+    many = (source.sample(_MANY), target.sample(_MANY))
+    poses = np.concatenate([poses, [_settled(pose, many) for pose in poses[: _KEPT // 2]]])
+    for number in range(_FINE_ROUNDS):
+        poses, score = _best(poses, _scores(poses, many, 1.0, _VETO), max(1, _KEPT >> (1 + number // 2)))
+        poses = _mutated(poses, target, 0.5 ** (_COARSE_ROUNDS - 2 + number), rng)
+    poses, score = _best(poses, _scores(poses, many, 1.0, _VETO), 1)
+    settled = _settled(poses[0], (source, target))
+    return max((measured(pose, source, target) for pose in (poses[0], settled)), key=lambda found: found.score)
 
 
-def measured(pose: Array, source: View, target: View, tolerance: float) -> Alignment:
+def measured(pose: Array, source: View, target: View) -> Alignment:
     """Judge a pose T_target_source by all points of both pieces."""
-    there = target.sight.judge(*_moved(pose[None], source.points, source.normals), tolerance)
-    back = source.sight.judge(*_moved(_inverse(pose)[None], target.points, target.normals), tolerance)
-    shares = np.array([[float(part.mean()) for part in side] for side in (there, back)])
-    confirmed, contradicted, astray = shares.T
-    return Alignment(pose, confirmed, contradicted, astray, float(_agreement(confirmed, contradicted, astray)))
+    shares = _shares(pose[None], (source, target), 1.0)[..., 0]
+    return Alignment(pose, *shares, float(_agreement(shares, _VETO)))
 
 
-def _agreement(confirmed: Array, contradicted: Array, astray: Array) -> Array:
-    return np.asarray((confirmed - _PENALTY * contradicted - astray).sum(axis=0) / 2.0)
+def _shares(poses: Array, views: tuple[View, View], looseness: float) -> Array:
+    """Give the shares (3, 2, poses) of confirmed, contradicted and astray points, there and back."""
+    sides = []
+    for moves, moving, still in ((poses, *views), (np.linalg.inv(poses), *views[::-1])):
+        turned = moves[:, :3, :3].swapaxes(1, 2)
+        places = moving.points @ turned + moves[:, None, :3, 3]
+        judged = still.sight.judge(places, moving.normals @ turned, looseness * still.tolerance)
+        sides.append([part.mean(axis=1) for part in judged])
+    return np.asarray(sides).swapaxes(0, 1)
 
 
-def _scores(
-    poses: Array, points: tuple[tuple[Array, Array], tuple[Array, Array]], sights: tuple[Sight, Sight], tolerance: float
-) -> Array:
-    backwards = np.linalg.inv(poses)
-    there = sights[1].judge(*_moved(poses, *points[0]), tolerance)
-    back = sights[0].judge(*_moved(backwards, *points[1]), tolerance)
-    parts = [np.stack([a.mean(axis=1), b.mean(axis=1)]) for a, b in zip(there, back, strict=True)]
-    return _agreement(*parts)
+def _agreement(shares: Array, penalty: float) -> Array:
+    confirmed, contradicted, astray = shares
+    return np.asarray((confirmed - penalty * contradicted - astray).mean(axis=0))
 
 
-def _moved(poses: Array, points: Array, normals: Array) -> tuple[Array, Array]:
-    turned = poses[:, :3, :3].swapaxes(1, 2)
-    return points @ turned + poses[:, None, :3, 3], normals @ turned
-
-
-def _some(view: View, rng: np.random.Generator, most: int = _COARSE_POINTS) -> tuple[Array, Array]:
-    rows = rng.choice(len(view.points), min(most, len(view.points)), replace=False)
-    return view.points[rows], view.normals[rows]
+def _scores(poses: Array, views: tuple[View, View], looseness: float, penalty: float) -> Array:
+    return _agreement(_shares(poses, views, looseness), penalty)
 
 
 def _best(poses: Array, score: Array, most: int) -> tuple[Array, Array]:
@@ -106,24 +101,59 @@ def _best(poses: Array, score: Array, most: int) -> tuple[Array, Array]:
     return poses[order], score[order]
 
 
-def _mutated(poses: Array, middle: Array, angle: float, shift: float, rng: np.random.Generator) -> Array:
-    """Turn about the target's middle and shift at random, `_MUTATIONS` times each."""
+def _mutated(poses: Array, target: View, step: float, rng: np.random.Generator) -> Array:
+    """Give the poses, and each turned about the target's middle and shifted at random."""
     count = len(poses) * _MUTATIONS
-    vector = rng.normal(0.0, angle, (count, 3))
-    size = np.linalg.norm(vector, axis=1)
-    x, y, z = (vector / size[:, None]).T
-    zero = np.zeros(count)
-    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
-    turn = (
-        np.eye(3)
-        + np.sin(size)[:, None, None] * cross
-        + (1 - np.cos(size))[:, None, None] * (cross @ cross)
-    )
     motion = np.tile(np.eye(4), (count, 1, 1))
+    turn = Rotation.from_rotvec(rng.normal(0.0, _TURN * step, (count, 3))).as_matrix()
+    shift = rng.normal(0.0, _SHIFT * step * target.extent, (count, 3))
     motion[:, :3, :3] = turn
-    motion[:, :3, 3] = middle - turn @ middle + rng.normal(0.0, shift, (count, 3))
-    return np.asarray(motion @ np.repeat(poses, _MUTATIONS, axis=0))
+    motion[:, :3, 3] = target.middle - turn @ target.middle + shift
+    return np.concatenate([poses, motion @ np.repeat(poses, _MUTATIONS, axis=0)])
 
 
-def _inverse(pose: Array) -> Array:
-    return np.linalg.inv(pose)
+def _settled(pose: Array, views: tuple[View, View]) -> Array:
+    """Refine a pose by point-to-plane least squares over the confirmed points, there and back.
+
+    The correspondences are those of the depth images. Where the points leave a direction free (along a
+    cylinder, in a plane), the least change is taken, none in that direction.
+    """
+    source, target = views
+    for _ in range(_SETTLING):
+        moved, normals = _placed(pose, source)
+        kept, foot, normal = target.sight.correspondences(moved, normals, target.tolerance)
+        rows = [_row(moved[kept], normal[kept])]
+        heights = [np.einsum("ij,ij->i", moved - foot, normal)[kept]]
+        back, normals = _placed(np.linalg.inv(pose), target)
+        kept, foot, normal = source.sight.correspondences(back, normals, source.tolerance)
+        normal = normal[kept] @ pose[:3, :3].T
+        # The target's point stays and the source's surface moves: the opposite sign.
+        rows.append(_row(target.points[kept], normal))
+        offset = target.points[kept] - (foot[kept] @ pose[:3, :3].T + pose[:3, 3])
+        heights.append(-np.einsum("ij,ij->i", offset, normal))
+        design, height = np.concatenate(rows), np.concatenate(heights)
+        if len(design) < 6:
+            break
+        middle, unit = target.middle, target.extent
+        # About the middle and in units of the extent, so that turns and shifts are alike.
+        design[:, :3] = (design[:, :3] - np.cross(middle, design[:, 3:])) / unit
+        change, *_ = np.linalg.lstsq(design, -height, rcond=_FREE)
+        turn = Rotation.from_rotvec(change[:3] / unit).as_matrix()
+        motion = np.eye(4)
+        motion[:3, :3] = turn
+        motion[:3, 3] = middle - turn @ middle + change[3:]
+        pose = motion @ pose
+    return pose
+
+
+_FREE = 0.03
+"""Of the largest singular value; directions below it are left alone."""
+
+
+def _placed(pose: Array, view: View) -> tuple[Array, Array]:
+    return view.points @ pose[:3, :3].T + pose[:3, 3], view.normals @ pose[:3, :3].T
+
+
+def _row(points: Array, normals: Array) -> Array:
+    """Give the change of heights for small turns and shifts, (n, 6)."""
+    return np.hstack([np.cross(points, normals), normals])

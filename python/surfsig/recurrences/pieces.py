@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 _LINK = 3.0
 """Point spacings between neighbours that hang together."""
 _CARRIED = 3
-"""Pieces that a plane must hold together to be a support; the faces of one object seldom hold more than two."""
+"""Pieces that a support carries at least; the faces of one object seldom have more than two beside them."""
 _THICKNESS = 4.0
 """Standard deviations about a support within which points are its own."""
 
@@ -72,21 +72,18 @@ def _carries(
     links: NDArray[np.int64],
     fewest: int,
 ) -> bool:
-    """Tell whether what touches a plane falls into several much smaller pieces without it."""
+    """Tell whether several much smaller pieces are above a plane, and not far from it."""
     without = ~support
     without[members] = False
-    touching = np.zeros(len(points), np.bool_)
-    on_plane = np.zeros(len(points), np.bool_)
-    on_plane[members] = True
-    touching[links[on_plane[links[:, 0]], 1]] = True
-    touching[links[on_plane[links[:, 1]], 0]] = True
-    half = _extent(points[members]) / 2.0
-    carried = [
-        piece
-        for piece in _connected(len(points), np.flatnonzero(without), links, fewest)
-        if touching[piece].any() and _extent(points[piece]) <= half
-    ]
-    return len(carried) >= _CARRIED
+    middle, extent = points[members].mean(axis=0), _extent(points[members])
+    normal = np.linalg.svd(points[members[:: 1 + len(members) // 1000]] - middle)[2][2]
+    carried = 0
+    for piece in _connected(len(points), np.flatnonzero(without), links, fewest):
+        size = _extent(points[piece])
+        offset = points[piece].mean(axis=0) - middle
+        height = abs(float(offset @ normal))
+        carried += size <= extent / 2.0 and height <= size and float(np.linalg.norm(offset)) <= extent / 2.0
+    return carried >= _CARRIED
 
 
 def _connected(

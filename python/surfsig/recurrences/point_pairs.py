@@ -5,11 +5,18 @@ Drost, Ulrich, Navab, Ilic: Model globally, match locally (CVPR 2010).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
+
+_NEAREST = 16
+_ALIKE = 4
+_TOLERANCE = 0.35
+"""Of features: radians, or parts of the unit of length."""
 
 
 def pair_features(
@@ -49,52 +56,36 @@ def all_pairs(points: Array, shortest: float) -> tuple[NDArray[np.int64], NDArra
     return first, second
 
 
-def proposed_poses(
-    source: tuple[Array, Array],
-    target: tuple[Array, Array],
-    length: float,
-    most: int,
-    rng: np.random.Generator,
-) -> Array:
-    """Propose poses T_target_source, (at most `most`, 4, 4).
+@dataclass(frozen=True, eq=False)
+class PointPairs:
+    """All pairs of some oriented points that are not too near, with a search tree of their features."""
 
-    Parameters
-    ----------
-    source, target
-        Points (n, 3) and unit normals (n, 3); some hundred.
-    length
-        Distance that counts as much as a radian of angle.
-    most
-        How many poses.
-    rng
-        Chooses among the pairs.
-    """
-    ends = all_pairs(source[0], 2.0 * length)
-    others = all_pairs(target[0], 2.0 * length)
-    if not len(ends[0]) or not len(others[0]):
+    points: Array
+    normals: Array
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
+    features: Array
+    tree: cKDTree
+
+    @classmethod
+    def of(cls, points: Array, normals: Array, length: float) -> PointPairs:
+        """Pair points (n, 3), some hundred; `length` counts as much as a radian of angle."""
+        first, second = all_pairs(points, 2.0 * length)
+        features = pair_features(points, normals, first, second, length)
+        return cls(points, normals, first, second, features, cKDTree(features))
+
+
+def proposed_poses(source: PointPairs, target: PointPairs, most: int, rng: np.random.Generator) -> Array:
+    """Propose poses T_target_source, (at most `most`, 4, 4), of pairs that `rng` chooses."""
+    if not len(source.first) or not len(target.first):
         return np.empty((0, 4, 4))
-    per_pair = 4
-    chosen = rng.choice(len(ends[0]), min(len(ends[0]), max(1, most // per_pair)), replace=False)
-    first, second = ends[0][chosen], ends[1][chosen]
-    tree = cKDTree(pair_features(*target, *others, length))
-    wanted = pair_features(*source, first, second, length)
-    near = min(16, len(others[0]))
-    distance, match = tree.query(wanted, k=near, distance_upper_bound=0.35)
-    distance, match = distance.reshape(len(first), -1), match.reshape(len(first), -1)
-    # Among the alike ones some at random: the very nearest are often neighbours of each other.
-    shuffled = rng.permuted(np.tile(np.arange(match.shape[1]), (len(match), 1)), axis=1)[:, :per_pair]
-    match = np.take_along_axis(match, shuffled, axis=1)
-    found = match < len(others[0])
-    row = np.repeat(np.arange(len(first)), found.sum(axis=1))
+    chosen = rng.choice(len(source.first), min(len(source.first), max(1, most // _ALIKE)), replace=False)
+    _, match = target.tree.query(source.features[chosen], k=_NEAREST, distance_upper_bound=_TOLERANCE)
+    # Of the alike ones some at random: the very nearest are often neighbours of each other.
+    match = rng.permuted(match, axis=1)[:, :_ALIKE]
+    found = match < len(target.first)
+    row = chosen[np.nonzero(found)[0]]
     column = match[found]
-    moving = frames_of(*source, first[row], second[row])
-    still = frames_of(*target, others[0][column], others[1][column])
-    return still @ _inverses(moving)
-
-
-def _inverses(poses: Array) -> Array:
-    result = np.tile(np.eye(4), (len(poses), 1, 1))
-    turned = poses[:, :3, :3].swapaxes(1, 2)
-    result[:, :3, :3] = turned
-    result[:, :3, 3] = -np.einsum("nij,nj->ni", turned, poses[:, :3, 3])
-    return result
+    moving = frames_of(source.points, source.normals, source.first[row], source.second[row])
+    still = frames_of(target.points, target.normals, target.first[column], target.second[column])
+    return np.asarray(still @ np.linalg.inv(moving))

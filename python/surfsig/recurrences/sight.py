@@ -10,10 +10,14 @@ from scipy import ndimage
 
 Array = NDArray[np.float64]
 
-_REACH = 2.5
+_REACH = 1.5
 """Pixels around a point of the scan that it speaks for; a pixel is a point spacing wide."""
 _MARGIN = 0.6
 """Of the piece's extent, seen around it."""
+_ALIKE = 0.8
+"""Cosine between normals that face alike; those of narrow surfaces and of edges are smoothed."""
+_BESIDE = 4.0
+"""Tolerances from the surface within which another surface would have been told from it."""
 _MOST_PIXELS = 512
 """Along a side, however dense the scan."""
 
@@ -28,12 +32,13 @@ class Sight:
 
     eye: Array
     axes: Array
-    low: Array
+    low: float
     pixel: float
     nearest: NDArray[np.int64]
     """(h, w), row of `points`; -1 where no point of the scan is near."""
     front: Array
-    """(h, w), smallest depth in the 3 x 3 pixels around; NaN where a pixel has none."""
+    """(h, w), smallest depth in the 3 x 3 pixels around; NaN where no point of the scan is in the pixel itself,
+    as in shadows and along rims too steep to be measured."""
     points: Array
     normals: Array
     own: NDArray[np.bool_]
@@ -44,9 +49,9 @@ class Sight:
         local = (places - self.eye) @ self.axes.T
         depth = local[..., 2]
         cell = np.floor((local[..., :2] / depth[..., None] - self.low) / self.pixel).astype(np.int64)
-        height, width = self.nearest.shape
-        inside = (cell[..., 0] >= 0) & (cell[..., 0] < height) & (cell[..., 1] >= 0) & (cell[..., 1] < width)
-        return np.where(inside & (depth > 0), cell[..., 0] * width + cell[..., 1], -1), depth
+        side = len(self.nearest)
+        inside = ((cell >= 0) & (cell < side)).all(axis=-1) & (depth > 0)
+        return np.where(inside, cell[..., 0] * side + cell[..., 1], -1), depth
 
     def judge(self, places: Array, normals: Array, tolerance: float) -> tuple[Array, Array, Array]:
         """Tell what the scan says about surface points at places (..., 3) with normals (..., 3).
@@ -58,17 +63,31 @@ class Sight:
         at another angle, or just beneath the surface).
         """
         cell, depth = self.project(places)
-        near = self.nearest.ravel()[np.maximum(cell, 0)]
-        known = (cell >= 0) & (near >= 0)
-        near = np.maximum(near, 0)
-        offset = places - self.points[near]
-        height = np.einsum("...i,...i->...", offset, self.normals[near])
-        alike = np.einsum("...i,...i->...", normals, self.normals[near])
-        on = known & (np.abs(height) <= tolerance)
-        confirmed = on & self.own[near] & (alike > 0.8)
+        near, known = self._seen(cell)
+        height, alike = self._relation(places, normals, near)
+        confirmed = known & self.own[near] & (np.abs(height) <= tolerance) & (alike > _ALIKE)
         contradicted = known & (depth < self.front.ravel()[np.maximum(cell, 0)] - 2.0 * tolerance)
-        astray = known & ~confirmed & ~contradicted & self.own[near] & (np.abs(height) <= 4.0 * tolerance)
-        return confirmed, contradicted, astray
+        beside = self.own[near] & (np.abs(height) <= _BESIDE * tolerance)
+        return confirmed, contradicted, known & beside & ~confirmed & ~contradicted
+
+    def correspondences(
+        self, places: Array, normals: Array, tolerance: float
+    ) -> tuple[NDArray[np.bool_], Array, Array]:
+        """Give which places (n, 3) are on the piece or beside it, and the point and normal (n, 3) seen there."""
+        near, known = self._seen(self.project(places)[0])
+        height, alike = self._relation(places, normals, near)
+        kept = known & self.own[near] & (np.abs(height) <= _BESIDE * tolerance) & (alike > _ALIKE)
+        return kept, self.points[near], self.normals[near]
+
+    def _seen(self, cell: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Give the scan's points in pixels, and where there is one."""
+        near = self.nearest.ravel()[np.maximum(cell, 0)]
+        return np.maximum(near, 0), (cell >= 0) & (near >= 0)
+
+    def _relation(self, places: Array, normals: Array, near: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Give the heights of places above the tangent planes there, and the cosines between the normals."""
+        height = np.einsum("...i,...i->...", places - self.points[near], self.normals[near])
+        return height, np.einsum("...i,...i->...", normals, self.normals[near])
 
 
 def sight_of(
@@ -89,7 +108,7 @@ def sight_of(
     image = local[:, :2] / local[:, 2:]
     pixel = max(spacing, 2.0 * reach / _MOST_PIXELS) / distance
     side_pixels = int(np.ceil(2.0 * reach / distance / pixel)) + 1
-    low = (middle - eye) @ axes[:2].T / distance - reach / distance
+    low = -reach / distance
     cell = np.floor((image - low) / pixel).astype(np.int64)
     inside = ((cell >= 0) & (cell < side_pixels)).all(axis=1)
     around, points, cell, depth = around[inside], points[inside], cell[inside], local[inside, 2]
@@ -102,7 +121,7 @@ def sight_of(
     front = ndimage.minimum_filter(front, 3, mode="nearest")
     gap, (rows, columns) = ndimage.distance_transform_edt(nearest < 0, return_indices=True)
     nearest = np.where(gap <= _REACH, nearest[rows, columns], -1)
-    front = np.where(gap <= _REACH, np.minimum(front, front[rows, columns]), np.nan)
+    front = np.where(gap == 0, front, np.nan)
     return Sight(
         eye, axes, low, pixel, nearest, front, points, cloud_normals[around], np.isin(around, piece)
     )
