@@ -25,6 +25,8 @@ _SETTLING = 5
 _PENALTY, _VETO = 4.0, 15.0
 """What a place counts where the sensor saw through the object, in confirmed places: at first, when even the
 best poses are not exact; and in the end, when hardly any is left on true ones."""
+_LOSS = 8.0
+"""What a place counts where the sensor ought to have measured something."""
 _HOPELESS = 0.1
 """Scores after the coarse search below which no fine one made a match."""
 
@@ -33,7 +35,7 @@ _HOPELESS = 0.1
 class Alignment:
     """How well one piece lies on another.
 
-    `confirmed`, `contradicted` and `astray` are shares of points: of the source's as the target's sensor sees
+    `confirmed`, `contradicted`, `astray` and `missing` are shares of points: of the source's as the target's sensor sees
     them, and the other way round, (2,).
     """
 
@@ -42,6 +44,7 @@ class Alignment:
     confirmed: Array
     contradicted: Array
     astray: Array
+    missing: Array
     score: float
     """1 where all is seen from both sides and agrees; 0 and below where nothing speaks for a match."""
 
@@ -61,7 +64,13 @@ def align(source: View, target: View, rng: np.random.Generator) -> Alignment | N
     if score[0] < _HOPELESS:
         return None
     many = (source.sample(_MANY), target.sample(_MANY))
-    poses = np.concatenate([poses, [_settled(pose, many) for pose in poses[: _KEPT // 2]]])
+    settled = [_settled(pose, many) for pose in poses[: _KEPT // 2]]
+    return refined(np.concatenate([poses, settled]), source, target, rng)
+
+
+def refined(poses: Array, source: View, target: View, rng: np.random.Generator) -> Alignment:
+    """Search around good poses T_target_source, (k, 4, 4), for the one that both pieces agree with most."""
+    many = (source.sample(_MANY), target.sample(_MANY))
     for number in range(_FINE_ROUNDS):
         poses, score = _best(poses, _scores(poses, many, 1.0, _VETO), max(1, _KEPT >> (1 + number // 2)))
         poses = _mutated(poses, target, 0.5 ** (_COARSE_ROUNDS - 2 + number), rng)
@@ -77,7 +86,7 @@ def measured(pose: Array, source: View, target: View) -> Alignment:
 
 
 def _shares(poses: Array, views: tuple[View, View], looseness: float) -> Array:
-    """Give the shares (3, 2, poses) of confirmed, contradicted and astray points, there and back."""
+    """Give the shares (4, 2, poses) of confirmed, contradicted, astray and missing points, there and back."""
     sides = []
     for moves, moving, still in ((poses, *views), (np.linalg.inv(poses), *views[::-1])):
         turned = moves[:, :3, :3].swapaxes(1, 2)
@@ -88,8 +97,9 @@ def _shares(poses: Array, views: tuple[View, View], looseness: float) -> Array:
 
 
 def _agreement(shares: Array, penalty: float) -> Array:
-    confirmed, contradicted, astray = shares
-    return np.asarray((confirmed - penalty * contradicted - astray).mean(axis=0))
+    confirmed, contradicted, astray, missing = shares
+    wrong = penalty * contradicted + _LOSS * missing + astray
+    return np.asarray((confirmed - wrong).mean(axis=0))
 
 
 def _scores(poses: Array, views: tuple[View, View], looseness: float, penalty: float) -> Array:

@@ -18,6 +18,10 @@ _ALIKE = 0.8
 """Cosine between normals that face alike; those of narrow surfaces and of edges are smoothed."""
 _BESIDE = 4.0
 """Tolerances from the surface within which another surface would have been told from it."""
+_LOST = 2.5
+"""Pixels from the next point of the scan on where nothing was measured."""
+_FACING = 0.64
+"""Cosine to the line of sight from which on a surface is not too steep to be measured (50 degrees)."""
 _MOST_PIXELS = 512
 """Along a side, however dense the scan."""
 
@@ -35,7 +39,9 @@ class Sight:
     low: float
     pixel: float
     nearest: NDArray[np.int64]
-    """(h, w), row of `points`; -1 where no point of the scan is near."""
+    """(h, w), row of the nearest of `points`."""
+    gap: Array
+    """(h, w), pixels to that point."""
     front: Array
     """(h, w), smallest depth in the 3 x 3 pixels around; NaN where no point of the scan is in the pixel itself,
     as in shadows and along rims too steep to be measured."""
@@ -53,14 +59,15 @@ class Sight:
         inside = ((cell >= 0) & (cell < side)).all(axis=-1) & (depth > 0)
         return np.where(inside, cell[..., 0] * side + cell[..., 1], -1), depth
 
-    def judge(self, places: Array, normals: Array, tolerance: float) -> tuple[Array, Array, Array]:
+    def judge(self, places: Array, normals: Array, tolerance: float) -> tuple[Array, Array, Array, Array]:
         """Tell what the scan says about surface points at places (..., 3) with normals (..., 3).
 
         Returns
         -------
-        Three (...) boolean arrays: confirmed (on the piece's own surface, facing alike), contradicted (the
-        sensor saw through that place), and astray (visible, neither in front nor behind, but not confirmed:
-        at another angle, or just beneath the surface).
+        Four (...) boolean arrays: confirmed (on the piece's own surface, facing alike), contradicted (the
+        sensor saw through that place), astray (visible, neither in front nor behind, but not confirmed: at
+        another angle, or just beneath the surface), and missing (in front and facing the sensor, but nothing
+        was measured there).
         """
         cell, depth = self.project(places)
         near, known = self._seen(cell)
@@ -68,7 +75,10 @@ class Sight:
         confirmed = known & self.own[near] & (np.abs(height) <= tolerance) & (alike > _ALIKE)
         contradicted = known & (depth < self.front.ravel()[np.maximum(cell, 0)] - 2.0 * tolerance)
         beside = self.own[near] & (np.abs(height) <= _BESIDE * tolerance)
-        return confirmed, contradicted, known & beside & ~confirmed & ~contradicted
+        towards = (self.eye - places) / np.linalg.norm(self.eye - places, axis=-1, keepdims=True)
+        facing = np.einsum("...i,...i->...", normals, towards) > _FACING
+        lost = (cell >= 0) & (self.gap.ravel()[np.maximum(cell, 0)] > _LOST) & facing & (height > -tolerance)
+        return confirmed, contradicted, known & beside & ~confirmed & ~contradicted, lost
 
     def correspondences(
         self, places: Array, normals: Array, tolerance: float
@@ -81,8 +91,8 @@ class Sight:
 
     def _seen(self, cell: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Give the scan's points in pixels, and where there is one."""
-        near = self.nearest.ravel()[np.maximum(cell, 0)]
-        return np.maximum(near, 0), (cell >= 0) & (near >= 0)
+        inside = np.maximum(cell, 0)
+        return self.nearest.ravel()[inside], (cell >= 0) & (self.gap.ravel()[inside] <= _REACH)
 
     def _relation(self, places: Array, normals: Array, near: NDArray[np.int64]) -> tuple[Array, Array]:
         """Give the heights of places above the tangent planes there, and the cosines between the normals."""
@@ -120,8 +130,8 @@ def sight_of(
     front[cell[order, 0], cell[order, 1]] = depth[order]
     front = ndimage.minimum_filter(front, 3, mode="nearest")
     gap, (rows, columns) = ndimage.distance_transform_edt(nearest < 0, return_indices=True)
-    nearest = np.where(gap <= _REACH, nearest[rows, columns], -1)
+    nearest = nearest[rows, columns]
     front = np.where(gap == 0, front, np.nan)
     return Sight(
-        eye, axes, low, pixel, nearest, front, points, cloud_normals[around], np.isin(around, piece)
+        eye, axes, low, pixel, nearest, gap, front, points, cloud_normals[around], np.isin(around, piece)
     )
