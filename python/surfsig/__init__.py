@@ -7,6 +7,7 @@ s = surfsig.extract(cloud, radius=0.02)
 s.k1, s.k2, s.normals, s.status            # curvature, per unit length, at every point
 w = s.signatures([100, 2000])              # equal surfaces have equal signatures
 surfsig.similarity(w[0], w[1])             # zeta, between 0 and 1
+found = surfsig.surfaces(cloud)            # planes, cylinders, spheres, ... and which points are whose
 
 `__version__` is the package's version, `INSTRUCTION_SET` the instructions that its kernels run on here.
 """
@@ -21,6 +22,7 @@ from surfsig.flat_atom import flat_atom_length
 from surfsig.point_cloud import PointCloud
 from surfsig.shapes import FittedShape, fit_cylinder, fit_plane, fit_sphere
 from surfsig.similarity import flipped, similarity, similarity_class, similarity_matrix
+from surfsig.surfaces import PointClass, Surface, Surfaces, surfaces
 
 __all__ = [
     "INSTRUCTION_SET",
@@ -30,8 +32,11 @@ __all__ = [
     "FittedShape",
     "Frame",
     "InvalidInputError",
+    "PointClass",
     "PointCloud",
     "Status",
+    "Surface",
+    "Surfaces",
     "SurfsigError",
     "__version__",
     "crop",
@@ -48,5 +53,6 @@ __all__ = [
     "similarity",
     "similarity_class",
     "similarity_matrix",
+    "surfaces",
     "write",
 ]

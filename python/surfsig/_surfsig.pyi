@@ -15,6 +15,7 @@ __all__ = [
     "Frame",
     "__version__",
     "extract",
+    "find_surfaces",
     "fit_cylinder",
     "fit_sphere",
     "voxel_representatives",
@@ -42,6 +43,16 @@ def extract(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> list[dict[str, NDArray[Any]]]: ...
+def find_surfaces(
+    points: NDArray[np.floating],
+    *,
+    origin: Sequence[float],
+    kinds: Sequence[str],
+    min_points: int | None = None,
+    noise: float | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> tuple[NDArray[np.int32], list[dict[str, Any]]]: ...
 def fit_sphere(points: NDArray[np.float64]) -> tuple[list[float], float] | None: ...
 def fit_cylinder(points: NDArray[np.float64]) -> tuple[list[float], list[float], float] | None: ...
 def voxel_representatives(

@@ -1,4 +1,4 @@
-"""The command line: `surfsig info`, `clean`, `convert`, `extract`, `fit`, `compare`, `paper`, `completion`.
+"""The command line, `surfsig`: its commands are those that are imported here.
 
 Each command is a file here that calls the library's public functions and prints; `run` turns everything that
 can go wrong into one line and an exit code.
@@ -20,6 +20,7 @@ from surfsig.cli.extract import extract_command
 from surfsig.cli.fit import fit_command
 from surfsig.cli.info import info_command
 from surfsig.cli.paper import paper_command
+from surfsig.cli.surfaces import surfaces_command
 from surfsig.errors import SurfsigError
 
 __all__ = ["command_line", "main", "run"]
@@ -41,6 +42,7 @@ def command_line() -> None:
     \b
     Begin with:
       surfsig info scan.ply                              what is in it, and how dense it is
+      surfsig surfaces scan.ply                          its planes, cylinders, spheres, and their sizes
       surfsig extract scan.ply --radius 0.02 -o out.ply  curvature of every point, for CloudCompare
     """  # noqa: D301 - \b is click's mark for lines to be kept as they are
 
@@ -50,6 +52,7 @@ for command in (
     clean_command,
     extract_command,
     fit_command,
+    surfaces_command,
     compare_command,
     convert_command,
     paper_command,

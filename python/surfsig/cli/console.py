@@ -6,7 +6,8 @@ import contextlib
 import json
 import math
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import click
@@ -81,9 +82,38 @@ def print_table(title: str, rows: Iterable[tuple[str, str]], *, err: bool) -> No
     Console(stderr=err, highlight=False).print(table)
 
 
+def print_columns(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table of several columns; in a pipe as plain lines, which are not folded."""
+    if not sys.stdout.isatty():
+        widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
+        click.echo(title)
+        for row in (header, *rows):
+            cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+            click.echo("  ".join(cells).rstrip())
+        return
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
+    for name in header:
+        table.add_column(name, overflow="fold")
+    for row in rows:
+        table.add_row(*map(Text, row))
+    Console(highlight=False).print(table)
+
+
 def print_json(values: Mapping[str, Any]) -> None:
     """Print one JSON object on one line; what is not finite becomes null, which JSON knows."""
     click.echo(json.dumps(_plain(values), allow_nan=False))
+
+
+def write_json(path: Path, values: Mapping[str, Any]) -> None:
+    """Write one JSON object to a file, as `print_json` prints it."""
+    from surfsig.files.atomic import replacing
+
+    with replacing(path) as file:
+        file.write(json.dumps(_plain(values), allow_nan=False, indent=1).encode() + b"\n")
 
 
 def number(value: float) -> str:

@@ -55,6 +55,11 @@ def pinhole(text: str) -> list[float]:
     return _numbers(text, 4, "525,525,319.5,239.5")
 
 
+def words(text: str) -> list[str]:
+    """Turn "plane,cylinder" into its words."""
+    return [word.strip() for word in text.split(",")]
+
+
 # Whether the file exists and is one is found out when it is opened, with the same message as from Python.
 CLOUD = click.Path(path_type=Path)
 

@@ -1,0 +1,127 @@
+"""`surfsig surfaces`: which parts of a scan are planes, cylinders, spheres, cones and tori."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from surfsig.cli.console import on_terminal, print_columns, print_json, progress_bar, write_json
+from surfsig.cli.options import CLOUD, input_options, quiet_option, threads_option, words
+
+if TYPE_CHECKING:
+    from surfsig import Surfaces
+
+
+@click.command("surfaces", no_args_is_help=True)
+@click.argument("file", type=CLOUD)
+@click.option("-o", "--output", type=CLOUD, help="A .ply, .pcd, .las, .laz, .e57, .npz or .parquet file.")
+@click.option(
+    "--json",
+    "json_file",
+    type=CLOUD,
+    metavar="FILE|-",
+    help="Write the surfaces with all errors as JSON; - is stdout.",
+)
+@click.option(
+    "--report", type=CLOUD, metavar="FILE.html", help="Write a page with a view that turns, and the table."
+)
+@click.option(
+    "--min-points",
+    type=int,
+    metavar="N",
+    help="Fewest points of a surface.  [default: 1/500 of all, 20 to 1000]",
+)
+@click.option(
+    "--noise",
+    type=float,
+    metavar="S",
+    help="Standard deviation of the points' distances.  [default: by the points]",
+)
+@click.option(
+    "--kinds",
+    type=words,
+    metavar="KIND,...",
+    help="Which to look for: plane, sphere, cylinder, cone, torus.  [default: all]",
+)
+@input_options
+@threads_option
+@quiet_option
+def surfaces_command(
+    file: Path,
+    output: Path | None,
+    json_file: Path | None,
+    report: Path | None,
+    min_points: int | None,
+    noise: float | None,
+    kinds: list[str] | None,
+    threads: int | None,
+    quiet: bool,
+    **reading: Any,
+) -> None:
+    """Find the planes, spheres, cylinders, cones and tori in FILE, with their radii and errors.
+
+    Nothing needs to be set. The output has the input's points and fields, and surface (its number, -1 for
+    none), surface_kind and point_class (1 plane, 2 cylinder, 3 sphere, 4 cone, 5 torus, 6 saddle, 7 edge,
+    8 free form, 0 unknown), confidence (0 to 1), and red, green, blue by surface.
+
+    \b
+    Examples:
+      surfsig surfaces scan.pcd
+      surfsig surfaces scan.pcd -o labelled.ply --report report.html
+      surfsig surfaces part.ply --unit mm --kinds plane,cylinder --json - | jq '.surfaces[].radius'
+    """  # noqa: D301
+    import surfsig
+    from surfsig.files import check_writable
+    from surfsig.files.atomic import check_target
+
+    on_stdout = json_file is not None and str(json_file) == "-"
+    if output is not None:
+        check_writable(output)
+    for target in (report, None if on_stdout else json_file):
+        if target is not None:
+            check_target(target)
+    shown = on_terminal() and not quiet
+    with progress_bar("reading", "bytes", shown=shown) as progress:
+        cloud = surfsig.read(file, progress=progress, **reading)
+    with progress_bar("finding surfaces", "points", shown=shown) as progress:
+        found = surfsig.surfaces(
+            cloud,
+            min_points=min_points,
+            noise=noise,
+            kinds=kinds,  # type: ignore[arg-type]  # the function says which there are
+            threads=threads,
+            progress=progress,
+        )
+    if not len(found):
+        warnings.warn(f"{file}: {found.summary()}", stacklevel=1)
+    if output is not None:
+        columns = {**found.columns(), "colors": found.colors}
+        with progress_bar("writing", "points", shown=shown) as progress:
+            surfsig.write(output, cloud, columns, progress=progress)
+    if report is not None:
+        found.write_report(report, title=f"Surfaces of {file.name}")
+    if on_stdout:
+        print_json(_values(file, found))
+    elif json_file is not None:
+        write_json(json_file, _values(file, found))
+    if len(found) and not on_stdout and not quiet:
+        print_columns(f"{file}: {found.summary()}", *found.table())
+
+
+def _values(file: Path, found: Surfaces) -> dict[str, Any]:
+    """Give what a program may want to know."""
+    import numpy as np
+
+    from surfsig import PointClass
+
+    counts = np.bincount(found.classes, minlength=len(PointClass)).tolist()
+    return {
+        "file": str(file),
+        "summary": found.summary(),
+        "points": len(found.cloud),
+        "classes": {kind.name.lower(): counts[kind] for kind in PointClass},
+        "surfaces": [{"number": number, **surface.values()} for number, surface in enumerate(found)],
+    }

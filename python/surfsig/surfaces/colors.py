@@ -1,0 +1,33 @@
+"""Colours that tell surfaces apart."""
+
+from __future__ import annotations
+
+import colorsys
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+NO_SURFACE = (150, 150, 150)
+"""Grey, for points of no surface."""
+
+_GOLDEN = (math.sqrt(5) - 1) / 2
+"""Of the circle of hues: no two of many such steps come close."""
+
+
+def surface_colors(count: int) -> NDArray[np.uint8]:
+    """Give so many distinct colours.
+
+    Parameters
+    ----------
+    count
+        How many.
+
+    Returns
+    -------
+    numpy.ndarray
+        Red, green, blue, (count, 3); the first ones are the same for any count.
+    """
+    lightness = (0.45, 0.62, 0.35)
+    colors = [colorsys.hls_to_rgb(0.6 + i * _GOLDEN, lightness[i % 3], 0.75) for i in range(count)]
+    return np.round(255 * np.array(colors).reshape(-1, 3)).astype(np.uint8)

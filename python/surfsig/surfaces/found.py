@@ -1,0 +1,211 @@
+"""The surfaces of a scan: which points are whose, and what each surface is."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfsig.point_cloud import PointCloud
+from surfsig.surfaces.classes import PointClass, classify
+from surfsig.surfaces.colors import NO_SURFACE, surface_colors
+from surfsig.surfaces.surface import Surface
+from surfsig.surfaces.wording import HEADER, table_rows
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FEWEST = 20
+"""Fewer points are never a surface by themselves."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Surfaces:
+    """The surfaces of a scan, the one with most points first; a sequence of `Surface`."""
+
+    cloud: PointCloud
+    """The scan."""
+    labels: NDArray[np.int32]
+    """The number of each point's surface, (n,); -1 for none."""
+    surfaces: list[Surface]
+    """The surfaces, in the order of their numbers."""
+    noise: float | None = None
+    """The standard deviation of the points' distances that was asked for; None where it was estimated."""
+    threads: int | None = None
+    """Threads that were asked for."""
+
+    def __len__(self) -> int:
+        """Return the number of surfaces."""
+        return len(self.surfaces)
+
+    def __iter__(self) -> Iterator[Surface]:
+        return iter(self.surfaces)
+
+    def __getitem__(self, number: int) -> Surface:
+        return self.surfaces[number]
+
+    def __repr__(self) -> str:
+        return f"Surfaces({self.summary()})"
+
+    @cached_property
+    def _classified(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        return classify(self.cloud, self.labels, self.surfaces, noise=self.noise, threads=self.threads)
+
+    @property
+    def classes(self) -> NDArray[np.uint8]:
+        """What each point belongs to, (n,), a `PointClass` as a number; made when first asked for.
+
+        A point of a surface has its kind. Another point is judged by the paraboloid through its 24 nearest
+        points: an edge where that does not converge, or where they stray from it at least twice as far as
+        noise does and farther than from a smooth surface; else a saddle where k1 and k2 differ from 0 to
+        different sides, at their standard errors (99 %); else a free form.
+        """
+        return self._classified[0]
+
+    @property
+    def confidence(self) -> NDArray[np.float32]:
+        """How sure the class is, (n,), from 0 to 1; made with `classes`.
+
+        Of a surface's point, 1 / (1 + exp((t^2 - 9) / 2)) at t standard deviations from the surface (0.99 on
+        it, 0.5 at three), times the probability that the surface's radii and angle are no chance (at their
+        standard errors). Of an edge, the share of the mean square distance that noise does not explain. Of a
+        saddle, the probability that both curvatures have their sign; of a free form, what that lacks to 1.
+        """
+        return self._classified[1]
+
+    def members(self, number: int) -> NDArray[np.intp]:
+        """Give the points of a surface.
+
+        Parameters
+        ----------
+        number
+            The surface's.
+
+        Returns
+        -------
+        numpy.ndarray
+            The numbers of its points, (m,).
+        """
+        return np.flatnonzero(self.labels == range(len(self))[number])
+
+    def summary(self) -> str:
+        """Say in words how many surfaces of each kind there are.
+
+        Returns
+        -------
+        str
+            For instance "7 surfaces: 6 planes, 1 sphere; 98.2 % of 12,000 points".
+        """
+        if not self.surfaces:
+            return f"no surface found: {self._why_none()}"
+        counts = Counter(surface.kind for surface in self.surfaces).most_common()
+        kinds = ", ".join(f"{count} {_plural(kind, count)}" for kind, count in counts)
+        share = float((self.labels >= 0).mean())
+        total = f"{len(self)} {_plural('surface', len(self))}"
+        return f"{total}: {kinds}; {share:.1%} of {len(self.cloud):,} points"
+
+    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Describe the surfaces for people, in sensible digits.
+
+        Returns
+        -------
+        The names of the columns, and a row for each surface: its number, kind, radius, the radius's 95 %
+        interval, size, area, number of points, rms.
+        """
+        return HEADER, table_rows(self)
+
+    @property
+    def colors(self) -> NDArray[np.uint8]:
+        """A colour for each point, (n, 3): red, green and blue of its surface, grey for none."""
+        return np.concatenate([surface_colors(len(self)), [NO_SURFACE]]).astype(np.uint8)[self.labels]
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Name what is known of each point, as files call it.
+
+        Returns
+        -------
+        (n,) arrays: surface (its number, -1 for none), surface_kind (its kind as a `PointClass`, 0 for none),
+        point_class, confidence.
+        """
+        in_surface = self.labels >= 0
+        return {
+            "surface": self.labels,
+            "surface_kind": np.where(in_surface, self.classes, PointClass.UNKNOWN).astype(np.uint8),
+            "point_class": self.classes,
+            "confidence": self.confidence,
+        }
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Give the surfaces as a pandas DataFrame, a row each; the index has their numbers.
+
+        Returns
+        -------
+        pandas.DataFrame
+            kind, radius, radius_std, radius_low, radius_high, major_radius, half_angle, center_x, ...,
+            axis_x, ..., length, width, arc, area, count, rms.
+
+        Raises
+        ------
+        InvalidInputError
+            If pandas is not installed.
+        """
+        from surfsig.convert.libraries import library
+
+        pandas = library("pandas", "pandas", "pandas")
+        columns: dict[str, Any] = {"kind": [surface.kind for surface in self]}
+        columns |= {name: self._numbers(name) for name in ("radius", "radius_std")}
+        intervals = np.array([surface.interval for surface in self]).reshape(-1, 2)
+        columns |= dict(zip(("radius_low", "radius_high"), intervals.T, strict=True))
+        columns |= {name: self._numbers(name) for name in ("major_radius", "half_angle")}
+        for name in ("center", "axis"):
+            vectors = self._numbers(name).reshape(-1, 3)
+            columns |= {f"{name}_{letter}": vectors[:, i] for i, letter in enumerate("xyz")}
+        columns |= {name: self._numbers(name) for name in ("length", "width", "arc", "area", "count", "rms")}
+        return pandas.DataFrame(columns)
+
+    def write_report(self, path: str | Path, *, title: str = "Surfaces") -> None:
+        """Write one HTML page: the points coloured by surface, in a view that turns, and a table with errors.
+
+        The page needs no network. Of many points 60,000 are drawn.
+
+        Parameters
+        ----------
+        path
+            Where to write.
+        title
+            The page's.
+
+        Raises
+        ------
+        InvalidInputError
+            If Plotly is not installed (`pip install surfsig[report]`).
+        """
+        from surfsig.files.atomic import replacing
+        from surfsig.surfaces.report import page
+
+        text = page(self, title)
+        with replacing(Path(path)) as file:
+            file.write(text.encode())
+
+    def _why_none(self) -> str:
+        finite = int(self.cloud.finite.sum())
+        if not len(self.cloud):
+            return "there are no points"
+        if not finite:
+            return f"of {len(self.cloud):,} points none is finite"
+        if finite < FEWEST:
+            return f"{finite:,} points are too few"
+        return f"of {finite:,} points too few lie on any one surface, within the noise around them"
+
+    def _numbers(self, name: str) -> NDArray[Any]:
+        return np.array([getattr(surface, name) for surface in self])
+
+
+def _plural(word: str, count: int) -> str:
+    return word if count == 1 else {"torus": "tori"}.get(word, word + "s")

@@ -1,0 +1,100 @@
+"""Places on a surface: how far points are from it, where along it, and how far round."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """A surface whose point of reference is 0."""
+
+    kind: str
+    axis: Array
+    radius: float
+    major_radius: float
+    half_angle: float
+
+    def heights(self, points: Array) -> Array:
+        """Give places along the axis; NaN for a sphere."""
+        return points @ self.axis
+
+    def away(self, points: Array) -> Array:
+        """Give distances from the axis."""
+        away: Array = np.linalg.norm(points - np.outer(self.heights(points), self.axis), axis=1)
+        return away
+
+    def foot(self, point: Array) -> Array:
+        """Give the place on a plane that is nearest to a point."""
+        foot: Array = point - (point @ self.axis) * self.axis
+        return foot
+
+    def distances(self, points: Array) -> Array:
+        """Give signed distances from the surface."""
+        if self.kind == "plane":
+            return self.heights(points)
+        if self.kind == "sphere":
+            length: Array = np.linalg.norm(points, axis=1)
+            return length - self.radius
+        away, heights = self.away(points), self.heights(points)
+        if self.kind == "cylinder":
+            return away - self.radius
+        if self.kind == "cone":
+            sine, cosine = math.sin(self.half_angle), math.cos(self.half_angle)
+            return (away - self.radius) * cosine - heights * sine
+        return np.hypot(away - self.major_radius, heights) - self.radius
+
+    def turns(self, points: Array) -> Array:
+        """Give angles about the axis."""
+        first, second = across(self.axis)
+        return np.arctan2(points @ second, points @ first)
+
+
+def across(axis: Array) -> tuple[Array, Array]:
+    """Give two unit vectors that make a right-handed system with an axis."""
+    first = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
+
+
+def covered_arc(placement: Placement, points: Array) -> float:
+    """Measure how far points go round: about the axis, or of a sphere as seen from its center."""
+    if placement.kind == "plane":
+        return math.nan
+    if placement.kind == "sphere":
+        towards = points / np.linalg.norm(points, axis=1, keepdims=True)
+        return 2 * float(np.arccos(np.clip(towards @ middle_direction(towards), -1, 1)).max())
+    turns = np.sort(placement.turns(points))
+    return 2 * math.pi - float(np.diff(turns, append=turns[0] + 2 * math.pi).max())
+
+
+def middle_direction(towards: Array) -> Array:
+    """Give the mean of directions; that of the first where they cancel out."""
+    mean = towards.mean(axis=0)
+    length = float(np.linalg.norm(mean))
+    middle: Array = mean / length if length > 1e-6 else towards[0]
+    return middle
+
+
+def in_plane(placement: Placement, points: Array) -> tuple[float, float]:
+    """Measure the sides of the smallest rectangle around points in a plane, the longer first.
+
+    One of its sides is along the convex hull.
+    """
+    from scipy.spatial import ConvexHull
+
+    flat = points @ np.column_stack(across(placement.axis))
+    hull = flat[ConvexHull(flat).vertices]
+    edges = np.diff(hull, axis=0, append=hull[:1])
+    edges /= np.linalg.norm(edges, axis=1, keepdims=True)
+    along = np.ptp(hull @ edges.T, axis=0)
+    beside = np.ptp(hull @ np.column_stack([-edges[:, 1], edges[:, 0]]).T, axis=0)
+    best = (along * beside).argmin()
+    sides = sorted((float(along[best]), float(beside[best])), reverse=True)
+    return sides[0], sides[1]

@@ -1,0 +1,91 @@
+"""From points to surfaces: `surfaces`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from surfsig import _surfsig
+from surfsig.arguments import MOST_NEIGHBORS, positive_length, thread_count, whole_number
+from surfsig.errors import InvalidInputError
+from surfsig.point_cloud import PointCloud
+from surfsig.surfaces.classes import members_of
+from surfsig.surfaces.found import Surfaces
+from surfsig.surfaces.surface import KINDS, Kind, described
+
+
+def surfaces(
+    cloud: PointCloud | ArrayLike,
+    *,
+    min_points: int | None = None,
+    noise: float | None = None,
+    kinds: Sequence[Kind] | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> Surfaces:
+    """Find the planes, spheres, cylinders, cones and tori of a scan, with their sizes and errors.
+
+    Surfaces grow from the smoothest points on, over neighbouring points that are within the noise around
+    them; the simplest kind that explains its points wins. Nothing needs to be set, and nothing is left to
+    chance: the result is always the same.
+
+    Parameters
+    ----------
+    cloud
+        A `PointCloud`, an array (n, 3) of numbers, or any other that `PointCloud.of` takes (Open3D, pandas,
+        ...). Points that are not finite belong to no surface.
+    min_points
+        Fewest points of a surface; by default a five-hundredth of all, from 20 to 1,000.
+    noise
+        Standard deviation of the points' distances from the surfaces, in the cloud's own unit; by default
+        estimated around each point.
+    kinds
+        Which to look for: "plane", "sphere", "cylinder", "cone", "torus"; all by default.
+    threads
+        Number of threads; all cores by default. The result is the same.
+    progress
+        Called with the number of points that have a surface, and of all, some twenty times a second.
+
+    Returns
+    -------
+    Surfaces
+        The number of each point's surface (`labels`), and the list of surfaces.
+
+    Raises
+    ------
+    InvalidInputError
+        If an argument has no meaning; its text says which.
+    """
+    scan = PointCloud.of(cloud)
+    threads = thread_count(threads)
+    noise = None if noise is None else positive_length(noise, "noise")
+    labels, entries = _surfsig.find_surfaces(
+        scan.offsets,
+        origin=scan.origin.tolist(),
+        kinds=_kinds(kinds),
+        min_points=None if min_points is None else whole_number(min_points, "min_points", MOST_NEIGHBORS),
+        noise=noise,
+        threads=threads,
+        progress=progress,
+    )
+    members = members_of(labels, len(entries))
+    found = [
+        described(entry, scan.offsets[chosen].astype(np.float64), scan.origin)
+        for entry, chosen in zip(entries, members, strict=True)
+    ]
+    return Surfaces(scan, labels, found, noise, threads)
+
+
+def _kinds(kinds: Sequence[Kind] | None) -> list[str]:
+    if kinds is None:
+        return list(KINDS)
+    chosen = [kinds] if isinstance(kinds, str) else list(kinds)
+    wrong = next((kind for kind in chosen if kind not in KINDS), None)
+    if wrong is not None:
+        raise InvalidInputError(f"kinds must be of {', '.join(KINDS)}, not {wrong!r:.40}")
+    if not chosen:
+        raise InvalidInputError(f"kinds must be some of {', '.join(KINDS)}")
+    # The core tries them in its own order, the simplest first.
+    return [kind for kind in KINDS if kind in chosen]

@@ -1,0 +1,62 @@
+"""The surfaces in words and sensible digits: a table for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from surfsig.surfaces.surface import Surface
+
+HEADER = ("", "kind", "radius", "95 % interval", "size", "area", "points", "rms")
+
+
+def table_rows(surfaces: Iterable[Surface]) -> list[tuple[str, ...]]:
+    """Describe each surface in as many words as `HEADER` has."""
+    return [
+        (
+            str(number),
+            surface.kind,
+            *_radius(surface),
+            _size(surface),
+            _number(surface.area),
+            f"{surface.count:,}",
+            f"{surface.rms:.2g}",
+        )
+        for number, surface in enumerate(surfaces)
+    ]
+
+
+def _radius(surface: Surface) -> tuple[str, str]:
+    """Write the radius and its interval with two digits of the error."""
+    if math.isnan(surface.radius):
+        return "", ""
+    low, high = surface.interval
+    if not high > low:
+        return f"{surface.radius:.5g}", ""
+    decimals = max(0, 1 - math.floor(math.log10(0.5 * (high - low))))
+    # Beyond float64's digits there is nothing to show.
+    decimals = min(decimals, max(0, 14 - math.floor(math.log10(abs(surface.radius)))))
+    return f"{surface.radius:.{decimals}f}", f"{low:.{decimals}f} to {high:.{decimals}f}"
+
+
+def _size(surface: Surface) -> str:
+    degrees = math.degrees(surface.arc)
+    if surface.kind == "plane":
+        return f"{_number(surface.length)} x {_number(surface.width)}"
+    if surface.kind == "sphere":
+        return f"{degrees:.0f}° wide"
+    size = f"{_number(surface.length)} long, {degrees:.0f}° round"
+    if surface.kind == "cone":
+        error = _error(math.degrees(surface.half_angle_std))
+        return f"half angle {math.degrees(surface.half_angle):.4g}°{error}, {size}"
+    if surface.kind == "torus":
+        return f"major radius {surface.major_radius:.5g}{_error(surface.major_radius_std)}, {size}"
+    return size
+
+
+def _error(error: float) -> str:
+    return "" if math.isnan(error) else f" +- {error:.2g}"
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}"
