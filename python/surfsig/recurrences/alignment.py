@@ -76,7 +76,9 @@ def refined(poses: Array, source: View, target: View, rng: np.random.Generator) 
         poses = _mutated(poses, target, 0.5 ** (_COARSE_ROUNDS - 2 + number), rng)
     poses, score = _best(poses, _scores(poses, many, 1.0, _VETO), 1)
     settled = _settled(poses[0], (source, target))
-    return max((measured(pose, source, target) for pose in (poses[0], settled)), key=lambda found: found.score)
+    return max(
+        (measured(pose, source, target) for pose in (poses[0], settled)), key=lambda found: found.score
+    )
 
 
 def measured(pose: Array, source: View, target: View) -> Alignment:

@@ -48,7 +48,9 @@ class EqualSurfaces:
         return len(self.members)
 
     def __repr__(self) -> str:
-        size = ", ".join(f"{name}={value:.6g} +- {self.size_std[name]:.2g}" for name, value in self.size.items())
+        size = ", ".join(
+            f"{name}={value:.6g} +- {self.size_std[name]:.2g}" for name, value in self.size.items()
+        )
         return f"EqualSurfaces({len(self)} x {self.kind}, {size})"
 
 

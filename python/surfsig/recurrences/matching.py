@@ -28,7 +28,10 @@ Pairs = dict[tuple[int, int], Alignment]
 
 
 def matched_pairs(
-    views: Sequence[View], signatures: Sequence[Array], seed: int, progress: Callable[[int, int], object] | None
+    views: Sequence[View],
+    signatures: Sequence[Array],
+    seed: int,
+    progress: Callable[[int, int], object] | None,
 ) -> Pairs:
     """Align all pairs of pieces whose signatures are alike.
 
