@@ -1,4 +1,4 @@
-"""Scenes of 30 objects of 8 kinds on a table, turned at random and partly hidden, as the simulated scanner sees them."""
+"""Scans of 30 simulated objects of 8 kinds on a table, turned at random and partly hidden."""
 
 from __future__ import annotations
 

@@ -22,8 +22,8 @@ import surfsig
 class Score:
     """How well groups fit the kinds of a scene.
 
-    `rand_index` is Hubert and Arabie's adjusted one, over objects. `merged` are pairs of kinds with objects in
-    one group; `alone` are objects that are in no group though their kind occurs again.
+    `rand_index` is Hubert and Arabie's adjusted one, over objects. `merged` are pairs of kinds with objects
+    in one group; `alone` are objects that are in no group though their kind occurs again.
     """
 
     rand_index: float
@@ -44,7 +44,7 @@ def adjusted_rand_index(a: NDArray[np.int64], b: NDArray[np.int64]) -> float:
 
 
 def group_of_objects(scene: RecurrenceScene, found: surfsig.Recurrences) -> NDArray[np.int64]:
-    """Give each object's group: that of the piece with most of its points; one of its own if it is in none."""
+    """Give each object's group: that of the piece with most of its points; one of its own without any."""
     count = len(scene.poses)
     group = np.arange(count) + len(found)
     piece, grouped = found.labels[0], found.group_labels[0]

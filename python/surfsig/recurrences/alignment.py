@@ -35,8 +35,8 @@ _HOPELESS = 0.1
 class Alignment:
     """How well one piece lies on another.
 
-    `confirmed`, `contradicted`, `astray` and `missing` are shares of points: of the source's as the target's sensor sees
-    them, and the other way round, (2,).
+    `confirmed`, `contradicted`, `astray` and `missing` are shares of points (see `Sight.judge`): of the
+    source's as the target's sensor sees them, and the other way round, (2,).
     """
 
     pose: Array
@@ -72,9 +72,9 @@ def refined(poses: Array, source: View, target: View, rng: np.random.Generator) 
     """Search around good poses T_target_source, (k, 4, 4), for the one that both pieces agree with most."""
     many = (source.sample(_MANY), target.sample(_MANY))
     for number in range(_FINE_ROUNDS):
-        poses, score = _best(poses, _scores(poses, many, 1.0, _VETO), max(1, _KEPT >> (1 + number // 2)))
+        poses, _ = _best(poses, _scores(poses, many, 1.0, _VETO), max(1, _KEPT >> (1 + number // 2)))
         poses = _mutated(poses, target, 0.5 ** (_COARSE_ROUNDS - 2 + number), rng)
-    poses, score = _best(poses, _scores(poses, many, 1.0, _VETO), 1)
+    poses, _ = _best(poses, _scores(poses, many, 1.0, _VETO), 1)
     settled = _settled(poses[0], (source, target))
     return max(
         (measured(pose, source, target) for pose in (poses[0], settled)), key=lambda found: found.score
@@ -84,7 +84,8 @@ def refined(poses: Array, source: View, target: View, rng: np.random.Generator) 
 def measured(pose: Array, source: View, target: View) -> Alignment:
     """Judge a pose T_target_source by all points of both pieces."""
     shares = _shares(pose[None], (source, target), 1.0)[..., 0]
-    return Alignment(pose, *shares, float(_agreement(shares, _VETO)))
+    confirmed, contradicted, astray, missing = shares
+    return Alignment(pose, confirmed, contradicted, astray, missing, float(_agreement(shares, _VETO)))
 
 
 def _shares(poses: Array, views: tuple[View, View], looseness: float) -> Array:
@@ -136,7 +137,7 @@ def _settled(pose: Array, views: tuple[View, View]) -> Array:
         kept, foot, normal = target.sight.correspondences(moved, normals, target.tolerance)
         rows = [_row(moved[kept], normal[kept])]
         heights = [np.einsum("ij,ij->i", moved - foot, normal)[kept]]
-        back, normals = _placed(np.linalg.inv(pose), target)
+        back, normals = _placed(np.asarray(np.linalg.inv(pose)), target)
         kept, foot, normal = source.sight.correspondences(back, normals, source.tolerance)
         normal = normal[kept] @ pose[:3, :3].T
         # The target's point stays and the source's surface moves: the opposite sign.

@@ -58,7 +58,7 @@ def equal_surfaces(found: Sequence[Surfaces], confidence: float) -> list[EqualSu
     """Group surfaces of equal size, within a scan and between scans.
 
     The two groups that differ least are joined while the difference of their means, and that of each member
-    from the new mean, is insignificant at their standard errors: a chain of neighbours does not join its ends.
+    from the new mean, is insignificant at their standard errors: a chain does not join its ends.
 
     Parameters
     ----------
@@ -73,31 +73,30 @@ def equal_surfaces(found: Sequence[Surfaces], confidence: float) -> list[EqualSu
     """
     groups: list[EqualSurfaces] = []
     for kind, names in _SIZES.items():
-        keys, sizes, errors = [], [], []
-        for scan, surfaces in enumerate(found):
-            for number, surface in enumerate(surfaces.surfaces):
-                error = [getattr(surface, f"{name}_std") for name in names]
-                if surface.kind == kind and np.isfinite(error).all() and min(error) > 0.0:
-                    keys.append((scan, number))
-                    sizes.append([getattr(surface, name) for name in names])
-                    errors.append(error)
+        keys = [
+            (scan, number)
+            for scan, surfaces in enumerate(found)
+            for number, surface in enumerate(surfaces.surfaces)
+            if surface.kind == kind and _known(surface, names)
+        ]
+        members = [found[scan].surfaces[number] for scan, number in keys]
+        sizes = np.array([[getattr(surface, name) for name in names] for surface in members])
+        errors = np.array([[getattr(surface, f"{name}_std") for name in names] for surface in members])
         limit = float(chi2.ppf(confidence, len(names)))
-        for rows in _joined(np.array(sizes), np.array(errors), limit):
+        for rows in _joined(sizes, errors, limit):
             if len(rows) > 1:
-                mean, error = _pooled(np.array(sizes)[rows], np.array(errors)[rows])
-                members = [keys[row] for row in rows]
-                pieces = [found[scan].surfaces[number] for scan, number in members]
-                groups.append(
-                    EqualSurfaces(
-                        kind,
-                        dict(zip(names, mean.tolist(), strict=True)),
-                        dict(zip(names, error.tolist(), strict=True)),
-                        members,
-                        np.stack([_motion(pieces[0], piece) for piece in pieces]),
-                        free_directions_of_surface(kind, pieces[0].center, pieces[0].axis),
-                    )
-                )
+                pooled = _pooled(sizes[rows], errors[rows])
+                mean, error = (dict(zip(names, values.tolist(), strict=True)) for values in pooled)
+                first = members[rows[0]]
+                poses = np.stack([_motion(first, members[row]) for row in rows])
+                free = free_directions_of_surface(kind, first.center, first.axis)
+                groups.append(EqualSurfaces(kind, mean, error, [keys[row] for row in rows], poses, free))
     return sorted(groups, key=lambda group: group.members[0])
+
+
+def _known(surface: Surface, names: Sequence[str]) -> bool:
+    """Tell whether a surface's size has errors that it can be compared by."""
+    return all(0.0 < getattr(surface, f"{name}_std") < np.inf for name in names)
 
 
 def _joined(sizes: Array, errors: Array, limit: float) -> list[list[int]]:

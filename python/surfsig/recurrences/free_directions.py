@@ -70,10 +70,9 @@ def free_directions(points: Array, normals: Array) -> list[FreeDirection]:
     if not len(free):
         return []
     # The turns among the free motions: the largest rotational parts.
-    _, sizes, ways = np.linalg.svd(free[:, :3])
+    left, sizes, _ = np.linalg.svd(free[:, :3])
     turns = int((sizes > _TURN_PART).sum())
     none = np.full(3, np.nan)
-    left, *_ = np.linalg.svd(free[:, :3])
     mixed = left.T @ free
     found: list[FreeDirection] = []
     if turns == 3:

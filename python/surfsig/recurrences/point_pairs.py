@@ -22,7 +22,7 @@ _TOLERANCE = 0.35
 def pair_features(
     points: Array, normals: Array, first: NDArray[np.int64], second: NDArray[np.int64], length: float
 ) -> Array:
-    """Give (m, 4): distance over `length`, angles of both normals to the connecting line, angle between them."""
+    """Give (m, 4): distance over `length`, both normals' angles to the line, the angle between them."""
     line = points[second] - points[first]
     distance = np.linalg.norm(line, axis=1)
     line /= distance[:, None]

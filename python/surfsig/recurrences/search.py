@@ -32,8 +32,8 @@ from surfsig.surfaces import Surfaces
 Array = NDArray[np.float64]
 
 _NORMAL_BALL, _SIGNATURE_BALL = 3.0, 8.0
-"""Point spacings: radii of the balls that normals and signatures come from. In a larger one noise counts less,
-and more of a piece is near its rim."""
+"""Point spacings: radii of the balls that normals and signatures come from. In a larger one noise counts
+less, and more of a piece is near its rim."""
 _SIGNATURES = 100
 """Per piece, at most."""
 _PAIR_UNIT = 0.1
@@ -52,9 +52,9 @@ def recurrences(
 
     Surfaces are grouped by kind and size. Pieces are what hangs together once the planes that carry several
     pieces are taken away. Two pieces match where they have signatures in common, and where there is a pose in
-    which each is what the other's sensor saw: on its surface, or hidden, but not where the sensor saw through,
-    nor where it would have seen something. So a half hidden piece matches a whole one. The result is always
-    the same.
+    which each is what the other's sensor saw: on its surface, or hidden, but not where the sensor saw
+    through, nor where it would have seen something. So a half hidden piece matches a whole one. The result is
+    always the same.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class _Scan:
             return []
         around = extract(self.cloud, radius=_NORMAL_BALL * self.spacing)
         normals = around.normals[self.numbers].astype(np.float64)
-        known = np.isfinite(normals).all(axis=1)
+        known = np.asarray(np.isfinite(normals).all(axis=1))
         normals[~known] = (0.0, 0.0, 1.0)
         tolerance = max(_NOISES * self._noise(around), _SPACINGS * self.spacing)
         row_of = np.full(len(self.cloud), -1, np.int64)
@@ -152,7 +152,8 @@ class _Scan:
         views = []
         for piece in self.pieces:
             rows = row_of[piece]
-            rows = rows[known[rows]] if known[rows].any() else rows
+            good = rows[known[rows]]
+            rows = good if len(good) else rows
             sight = sight_of(rows, self.points, normals, self._eye(piece), self.spacing)
             views.append(view_of(rows, self.points, normals, sight, self.spacing, length, tolerance))
         return views
@@ -172,7 +173,9 @@ class _Scan:
         for piece in self.pieces:
             rows = np.arange(start, start + len(piece))
             start += len(piece)
-            good = np.random.default_rng(len(piece)).permutation(rows[around.ok[rows]])[:_SIGNATURES]
+            good = np.random.default_rng(len(piece)).permutation(rows[np.asarray(around.ok)[rows]])[
+                :_SIGNATURES
+            ]
             w = around.signatures(good, flat_atom=flat).astype(np.float64)
             result.append(w[np.isfinite(w).all(axis=1)])
         return result

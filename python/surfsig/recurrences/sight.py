@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 _REACH = 1.5
 """Pixels around a point of the scan that it speaks for; a pixel is a point spacing wide."""
@@ -43,11 +44,11 @@ class Sight:
     gap: Array
     """(h, w), pixels to that point."""
     front: Array
-    """(h, w), smallest depth in the 3 x 3 pixels around; NaN where no point of the scan is in the pixel itself,
-    as in shadows and along rims too steep to be measured."""
+    """(h, w), smallest depth in the 3 x 3 pixels around; NaN where no point of the scan is in the pixel
+    itself, as in shadows and along rims too steep to be measured."""
     points: Array
     normals: Array
-    own: NDArray[np.bool_]
+    own: Mask
     """Which points belong to the piece itself."""
 
     def project(self, places: Array) -> tuple[NDArray[np.int64], Array]:
@@ -59,7 +60,7 @@ class Sight:
         inside = ((cell >= 0) & (cell < side)).all(axis=-1) & (depth > 0)
         return np.where(inside, cell[..., 0] * side + cell[..., 1], -1), depth
 
-    def judge(self, places: Array, normals: Array, tolerance: float) -> tuple[Array, Array, Array, Array]:
+    def judge(self, places: Array, normals: Array, tolerance: float) -> tuple[Mask, Mask, Mask, Mask]:
         """Tell what the scan says about surface points at places (..., 3) with normals (..., 3).
 
         Returns
@@ -77,19 +78,18 @@ class Sight:
         beside = self.own[near] & (np.abs(height) <= _BESIDE * tolerance)
         towards = (self.eye - places) / np.linalg.norm(self.eye - places, axis=-1, keepdims=True)
         facing = np.einsum("...i,...i->...", normals, towards) > _FACING
-        lost = (cell >= 0) & (self.gap.ravel()[np.maximum(cell, 0)] > _LOST) & facing & (height > -tolerance)
-        return confirmed, contradicted, known & beside & ~confirmed & ~contradicted, lost
+        nothing = (cell >= 0) & (self.gap.ravel()[np.maximum(cell, 0)] > _LOST)
+        missing: Mask = nothing & facing & (height > -tolerance)
+        return confirmed, contradicted, known & beside & ~confirmed & ~contradicted, missing
 
-    def correspondences(
-        self, places: Array, normals: Array, tolerance: float
-    ) -> tuple[NDArray[np.bool_], Array, Array]:
-        """Give which places (n, 3) are on the piece or beside it, and the point and normal (n, 3) seen there."""
+    def correspondences(self, places: Array, normals: Array, tolerance: float) -> tuple[Mask, Array, Array]:
+        """Give which places (n, 3) are on the piece or beside it, and the points and normals seen there."""
         near, known = self._seen(self.project(places)[0])
         height, alike = self._relation(places, normals, near)
         kept = known & self.own[near] & (np.abs(height) <= _BESIDE * tolerance) & (alike > _ALIKE)
         return kept, self.points[near], self.normals[near]
 
-    def _seen(self, cell: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def _seen(self, cell: NDArray[np.int64]) -> tuple[NDArray[np.int64], Mask]:
         """Give the scan's points in pixels, and where there is one."""
         inside = np.maximum(cell, 0)
         return self.nearest.ravel()[inside], (cell >= 0) & (self.gap.ravel()[inside] <= _REACH)
