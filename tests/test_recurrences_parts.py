@@ -69,7 +69,8 @@ def test_a_chain_of_sizes_does_not_join_its_ends() -> None:
 
 
 def test_planes_and_surfaces_without_errors_have_no_size_to_compare() -> None:
-    scan = found(*[surface("plane", np.nan, np.nan)] * 2, *[surface("sphere", 0.02, np.nan)] * 2)
+    ball = surface("sphere", 0.02, np.nan)
+    scan = found(*[dataclasses.replace(ball, kind="plane", radius=np.nan)] * 2, ball, ball)
     assert equal_surfaces([scan], 0.99) == []
 
 
@@ -174,7 +175,7 @@ def board(side: int = 60) -> Array:
 
 def test_pieces_are_what_a_support_carries() -> None:
     table = board()
-    bricks = [board(6) + (x, y, 2.5) for x, y in ((5, 5), (40, 8), (20, 40))]
+    bricks = [board(6) + np.array([x, y, 2.5]) for x, y in ((5, 5), (40, 8), (20, 40))]
     points = np.concatenate([table, *bricks])
     plane = (np.arange(len(table)), np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.01)
     pieces, support = pieces_of(points, [plane], point_spacing(points), 20)
@@ -183,15 +184,15 @@ def test_pieces_are_what_a_support_carries() -> None:
 
 
 def test_a_sensor_sees_what_is_on_hidden_through_and_missing() -> None:
-    """A square with a gap in front of a wall, seen from above, with a strip where nothing was measured."""
-    wall, square = board() * 1.0, board(20) + (10, 20, 10)
-    wall = wall[(wall[:, 0] < 40) | (wall[:, 0] > 50)]
+    """A square in front of a wall, seen from above, with a strip beside it where nothing was measured."""
+    wall, square = board(), board(20) + np.array([10.0, 20.0, 10.0])
+    wall = wall[(wall[:, 0] < 30) | (wall[:, 0] > 36)]
     points = np.concatenate([wall, square])
     normals = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     own = np.arange(len(wall), len(points))
     sight = sight_of(own, points, normals, np.array([20.0, 30.0, 1e4]), 1.0)
     # On the square, just below it, far below it; in front of the wall; where nothing was measured.
-    places = np.array([[15, 30, 10.1], [15, 30, 9.0], [15, 30, 2.0], [35, 30, 8.0], [45, 30, 10.0]])
+    places = np.array([[15, 30, 10.1], [15, 30, 9.0], [15, 30, 2.0], [26, 45, 8.0], [33, 30, 10.0]])
     judged = sight.judge(places, np.tile([0.0, 0.0, 1.0], (5, 1)), 0.3)
     confirmed, contradicted, astray, missing = (np.flatnonzero(part).tolist() for part in judged)
     assert (confirmed, contradicted, astray, missing) == ([0], [3], [1], [4])

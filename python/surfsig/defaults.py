@@ -50,7 +50,7 @@ INTERVAL = 0.95
 RECURRENCE_POINTS = 100
 """Fewest points of a piece that is compared with others; with less, little speaks against a match."""
 
-RECURRENCE_SCORE = 0.3
+RECURRENCE_SCORE = 0.25
 """Average score between the pieces of a group, at least."""
 
 RECURRENCE_CONFIDENCE = 0.99

@@ -22,11 +22,12 @@ _TURN, _SHIFT = 0.15, 0.06
 """Of the first random changes: radians, and parts of the piece's extent; halved each round."""
 _COARSE_ROUNDS, _FINE_ROUNDS = 4, 6
 _SETTLING = 5
-_PENALTY, _VETO = 4.0, 15.0
-"""What a place counts where the sensor saw through the object, in confirmed places: at first, when even the
-best poses are not exact; and in the end, when hardly any is left on true ones."""
-_LOSS = 8.0
-"""What a place counts where the sensor ought to have measured something."""
+_COARSE, _FINE = (4.0, 8.0), (15.0, 40.0)
+"""What a contradicted and a missing place count, in confirmed ones: at first, when even the best poses are not
+exact; and in the end, when hardly any is left on true ones."""
+_FLAT, _ROUND = 0.7, 0.1
+"""What a match of one plane counts against a round one, as many objects have a flat face; and the spread of
+confirmed normals (1 less the largest eigenvalue of their second moments) from which on it is round."""
 _HOPELESS = 0.1
 """Scores after the coarse search below which no fine one made a match."""
 
@@ -55,12 +56,12 @@ def align(source: View, target: View, rng: np.random.Generator) -> Alignment | N
     if not len(poses):
         return None
     few = (source.sample(_FEW), target.sample(_FEW))
-    poses, _ = _best(poses, _scores(poses, few, 2.0, _PENALTY), _TRIED)
+    poses, _ = _best(poses, _scores(poses, few, 2.0, _COARSE), _TRIED)
     some = (source.sample(_SOME), target.sample(_SOME))
-    poses, score = _best(poses, _scores(poses, some, 1.0, _PENALTY), _KEPT)
+    poses, score = _best(poses, _scores(poses, some, 1.0, _COARSE), _KEPT)
     for number in range(_COARSE_ROUNDS):
         poses = _mutated(poses, target, 0.5**number, rng)
-        poses, score = _best(poses, _scores(poses, some, 1.0, _PENALTY), _KEPT)
+        poses, score = _best(poses, _scores(poses, some, 1.0, _COARSE), _KEPT)
     if score[0] < _HOPELESS:
         return None
     many = (source.sample(_MANY), target.sample(_MANY))
@@ -72,9 +73,9 @@ def refined(poses: Array, source: View, target: View, rng: np.random.Generator) 
     """Search around good poses T_target_source, (k, 4, 4), for the one that both pieces agree with most."""
     many = (source.sample(_MANY), target.sample(_MANY))
     for number in range(_FINE_ROUNDS):
-        poses, _ = _best(poses, _scores(poses, many, 1.0, _VETO), max(1, _KEPT >> (1 + number // 2)))
+        poses, _ = _best(poses, _scores(poses, many, 1.0, _FINE), max(1, _KEPT >> (1 + number // 2)))
         poses = _mutated(poses, target, 0.5 ** (_COARSE_ROUNDS - 2 + number), rng)
-    poses, _ = _best(poses, _scores(poses, many, 1.0, _VETO), 1)
+    poses, _ = _best(poses, _scores(poses, many, 1.0, _FINE), 1)
     settled = _settled(poses[0], (source, target))
     return max(
         (measured(pose, source, target) for pose in (poses[0], settled)), key=lambda found: found.score
@@ -85,7 +86,8 @@ def measured(pose: Array, source: View, target: View) -> Alignment:
     """Judge a pose T_target_source by all points of both pieces."""
     shares = _shares(pose[None], (source, target), 1.0)[..., 0]
     confirmed, contradicted, astray, missing = shares
-    return Alignment(pose, confirmed, contradicted, astray, missing, float(_agreement(shares, _VETO)))
+    score = float(_agreement(shares, _FINE)) * _weight(pose, source, target)
+    return Alignment(pose, confirmed, contradicted, astray, missing, score)
 
 
 def _shares(poses: Array, views: tuple[View, View], looseness: float) -> Array:
@@ -99,14 +101,26 @@ def _shares(poses: Array, views: tuple[View, View], looseness: float) -> Array:
     return np.asarray(sides).swapaxes(0, 1)
 
 
-def _agreement(shares: Array, penalty: float) -> Array:
+def _agreement(shares: Array, penalties: tuple[float, float]) -> Array:
     confirmed, contradicted, astray, missing = shares
-    wrong = penalty * contradicted + _LOSS * missing + astray
+    wrong = penalties[0] * contradicted + penalties[1] * missing + astray
     return np.asarray((confirmed - wrong).mean(axis=0))
 
 
-def _scores(poses: Array, views: tuple[View, View], looseness: float, penalty: float) -> Array:
-    return _agreement(_shares(poses, views, looseness), penalty)
+def _scores(
+    poses: Array, views: tuple[View, View], looseness: float, penalties: tuple[float, float]
+) -> Array:
+    return _agreement(_shares(poses, views, looseness), penalties)
+
+
+def _weight(pose: Array, source: View, target: View) -> float:
+    """Give what the confirmed part of a match counts: less where it is one plane."""
+    places, normals = _placed(pose, source)
+    confirmed = normals[target.sight.judge(places, normals, target.tolerance)[0]]
+    if not len(confirmed):
+        return 0.0
+    spread = 1.0 - float(np.linalg.eigvalsh(confirmed.T @ confirmed / len(confirmed))[-1])
+    return _FLAT + (1.0 - _FLAT) * min(spread / _ROUND, 1.0)
 
 
 def _best(poses: Array, score: Array, most: int) -> tuple[Array, Array]:
