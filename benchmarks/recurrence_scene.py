@@ -23,7 +23,8 @@ SCANNER = simulate.Scanner(
     noise=1e-4,
 )
 COLUMNS, ROWS, PITCH = 6, 5, 0.072
-TABLE_TILT = np.radians(20.0)
+TABLE_TILT = np.radians(30.0)
+"""Towards the scanner, which so sees tops and sides."""
 
 
 def _upright(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
@@ -65,9 +66,14 @@ class RecurrenceScene:
 
 
 def recurrence_scene(
-    seed: int, *, columns: int = COLUMNS, rows: int = ROWS, kinds: tuple[str, ...] = tuple(KINDS)
+    seed: int,
+    *,
+    columns: int = COLUMNS,
+    rows: int = ROWS,
+    kinds: tuple[str, ...] = tuple(KINDS),
+    any_way: bool = False,
 ) -> RecurrenceScene:
-    """Place objects on a jittered grid, in any orientation, and scan them.
+    """Place objects on a jittered grid and scan them.
 
     Parameters
     ----------
@@ -77,6 +83,9 @@ def recurrence_scene(
         Of the grid; one object per cell.
     kinds
         Names of `KINDS` that occur, each about equally often.
+    any_way
+        Whether objects are turned in any way; otherwise each stands or lies on one of its sides, turned about
+        the vertical. Some of those turned in any way show one flat face only.
     """
     rng = np.random.default_rng(seed)
     kind_of_object = rng.permutation(np.arange(columns * rows) % len(kinds))
@@ -90,7 +99,7 @@ def recurrence_scene(
             -0.006, 0.006, 2
         )
         parts = KINDS[kinds[kind]]
-        rotation = _random_rotation(rng)
+        rotation = _random_rotation(rng) if any_way else _resting(rng)
         lowest = max(_reach(surface, pose, rotation) for surface, pose in parts)
         pose = tilt @ simulate.pose((x, y, -lowest), rotation)
         poses.append(pose)
@@ -118,6 +127,13 @@ def _random_rotation(rng: np.random.Generator) -> Array:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def _resting(rng: np.random.Generator) -> Array:
+    """Put one of the six sides down, and turn about the vertical."""
+    side = np.eye(3)[rng.permutation(3)] * rng.choice((-1.0, 1.0), 3)[:, None]
+    side[0] *= np.linalg.det(side)
+    return np.asarray(simulate.turn((0.0, 0.0, 1.0), rng.uniform(0.0, 2.0 * np.pi)) @ side)
 
 
 def _reach(surface: simulate.Surface, pose: Array, rotation: Array) -> float:

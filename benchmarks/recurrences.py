@@ -111,10 +111,11 @@ def main() -> None:
     """Run the scenes, and print a line for each."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4, 5])
+    parser.add_argument("--any-way", action="store_true", help="turn objects in any way, as if they hung")
     parser.add_argument("--picture", type=Path, help="draw the first scene")
     options = parser.parse_args()
     for seed in options.seeds:
-        scene = recurrence_scene(seed)
+        scene = recurrence_scene(seed, any_way=options.any_way)
         start = time.perf_counter()
         surfaces = surfsig.surfaces(scene.cloud)
         middle = time.perf_counter()

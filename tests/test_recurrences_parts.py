@@ -24,9 +24,10 @@ Array = NDArray[np.float64]
 
 def surface(kind: str, radius: float, std: float, *, axis: Array | None = None, **sizes: float) -> Surface:
     """Make a surface at a place that depends on its radius."""
+    place = np.array([radius, 2.0, 3.0])
     entry = {
         "kind": kind,
-        "point": np.array([radius, 2.0, 3.0]),
+        "point": place,
         "axis": np.array([0.0, 0.0, 1.0]) if axis is None else axis,
         "radius": radius,
         "radius_std": std,
@@ -39,7 +40,7 @@ def surface(kind: str, radius: float, std: float, *, axis: Array | None = None, 
     }
     points = np.random.default_rng(0).normal(size=(12, 3))
     made = described(entry, points, np.zeros(3))
-    return dataclasses.replace(made, center=entry["point"])
+    return dataclasses.replace(made, center=place)
 
 
 def found(*surfaces: Surface) -> Surfaces:

@@ -23,8 +23,8 @@ _TURN, _SHIFT = 0.15, 0.06
 _COARSE_ROUNDS, _FINE_ROUNDS = 4, 6
 _SETTLING = 5
 _COARSE, _FINE = (4.0, 8.0), (15.0, 40.0)
-"""What a contradicted and a missing place count, in confirmed ones: at first, when even the best poses are not
-exact; and in the end, when hardly any is left on true ones."""
+"""What a contradicted and a missing place count, in confirmed ones: at first, when even the best poses are
+not exact; and in the end, when hardly any is left on true ones."""
 _FLAT, _ROUND = 0.7, 0.1
 """What a match of one plane counts against a round one, as many objects have a flat face; and the spread of
 confirmed normals (1 less the largest eigenvalue of their second moments) from which on it is round."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .poses import Array
-from .surfaces import Surface, _round_crossings
+from .surfaces import Surface, round_crossings
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Ellipsoid(Surface):
     def crossings(self, origins: Array, directions: Array) -> Array:
         """See :meth:`Surface.crossings`; k = 2."""
         # Scaled along its axes it is the unit sphere, and the ray's parameters stay what they are.
-        return _round_crossings(origins / self.semi_axes, directions / self.semi_axes, 1.0)
+        return round_crossings(origins / self.semi_axes, directions / self.semi_axes, 1.0)
 
     def implicit(self, points: Array) -> Array:
         """Distance from the middle in semi-axes, less one, times the shortest of them."""
