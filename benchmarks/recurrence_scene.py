@@ -51,18 +51,14 @@ KINDS: dict[str, list[tuple[simulate.Surface, Array]]] = {
 class RecurrenceScene:
     """A scan and its truth: each point's object (-1 for the table), each object's kind and pose.
 
-    `poses` are T_scan_object, (objects, 4, 4).
+    `kind_of_object` are numbers of `kinds`; `poses` are T_scan_object, (objects, 4, 4).
     """
 
     cloud: surfsig.PointCloud
     object_of_point: NDArray[np.int64]
     kind_of_object: NDArray[np.int64]
     poses: Array
-
-    def seen(self, fewest: int = 1) -> NDArray[np.int64]:
-        """Numbers of the objects that have at least so many points."""
-        counts = np.bincount(self.object_of_point[self.object_of_point >= 0], minlength=len(self.poses))
-        return np.flatnonzero(counts >= fewest)
+    kinds: tuple[str, ...]
 
 
 def recurrence_scene(
@@ -114,7 +110,7 @@ def recurrence_scene(
         offsets=cloud.offsets, fields=cloud.fields, viewpoints=SCANNER.laser_at(sheets)
     )
     objects = np.array(object_of_surface)[cloud.fields["surface"]]
-    return RecurrenceScene(cloud, objects, kind_of_object, np.array(poses))
+    return RecurrenceScene(cloud, objects, kind_of_object, np.array(poses), kinds)
 
 
 def _random_rotation(rng: np.random.Generator) -> Array:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from recurrence_scene import KINDS, RecurrenceScene, recurrence_scene
+from recurrence_scene import RecurrenceScene, recurrence_scene
 from scipy.special import comb
 
 import surfsig
@@ -60,7 +60,7 @@ def group_of_objects(scene: RecurrenceScene, found: surfsig.Recurrences) -> NDAr
 def scored(scene: RecurrenceScene, found: surfsig.Recurrences) -> Score:
     """Compare groups with kinds."""
     group = group_of_objects(scene, found)
-    names = list(KINDS)
+    names = scene.kinds
     kind = scene.kind_of_object
     merged = {
         (names[min(a, b)], names[max(a, b)])
@@ -123,7 +123,8 @@ def main() -> None:
         end = time.perf_counter()
         score = scored(scene, found)
         print(
-            f"seed {seed}: adjusted Rand index {score.rand_index:.3f}, {score.groups} groups of 8 kinds; "
+            f"seed {seed}: adjusted Rand index {score.rand_index:.3f}, {score.groups} groups of "
+            f"{len(scene.kinds)} kinds; "
             f"merged: {score.merged or 'none'}; alone: {score.alone or 'none'}; "
             f"surfaces {middle - start:.1f} s, recurrences {end - middle:.1f} s",
             flush=True,

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_SLIPS = 0.02
+_SLIPS = 0.04
 """Largest root mean square of heights that a free motion makes, over that of its points' ways."""
-_TURN_PART = 0.1
+_TURN_PART = 0.3
 """Part of a motion that is a turn below which it is a slide."""
 
 Motion = Literal["turn", "slide"]
@@ -61,6 +61,8 @@ def free_directions(points: Array, normals: Array) -> list[FreeDirection]:
     points, normals
         (n, 3) places and unit normals.
     """
+    if not len(points):
+        return []
     middle = points.mean(axis=0)
     local = points - middle
     unit = float(np.sqrt((local**2).sum(axis=1).mean())) or 1.0

@@ -84,6 +84,7 @@ def recurrences(
     pieces: list[Piece] = []
     views: list[View] = []
     signatures: list[Array] = []
+    smooth: list[tuple[Array, Array]] = []
     labels = [np.full(len(scan.cloud), -1, np.int32) for scan in scans]
     prepared = [_Scan(number, scan, fewest) for number, scan in enumerate(scans)]
     extents = [extent for scan in prepared for extent in scan.extents()]
@@ -95,11 +96,13 @@ def recurrences(
             pieces.append(scan.described(points))
         if several:
             views += scan.views(length)
-            signatures += scan.signatures()
+            described = scan.signatures()
+            signatures += [rows for rows, _, _ in described]
+            smooth += [(points, normals) for _, points, normals in described]
     pairs = matched_pairs(views, signatures, RECURRENCE_SEED, progress)
     scores = scores_of(pairs, len(pieces))
     groups = [
-        _recurrence(members, pieces, views, pairs, scores, [scan.cloud.origin for scan in scans])
+        _recurrence(members, pieces, smooth[members[0]], pairs, scores, [scan.cloud.origin for scan in scans])
         for members in groups_of(scores, RECURRENCE_SCORE)
         if len(members) > 1
     ]
@@ -158,8 +161,8 @@ class _Scan:
             views.append(view_of(rows, self.points, normals, sight, self.spacing, length, tolerance))
         return views
 
-    def signatures(self) -> list[Array]:
-        """Give some signatures of each piece, (k, 243)."""
+    def signatures(self) -> list[tuple[Array, Array, Array]]:
+        """Give of each piece some signatures, (k, 243), and their places and normals, (k, 3)."""
         if not self.pieces:
             return []
         at = np.concatenate(self.pieces)
@@ -169,7 +172,7 @@ class _Scan:
             flat = flat_atom_length(around)
         except InvalidInputError:
             # No place has a curvature: nothing is known of any piece, and geometry decides.
-            return [np.empty((0, 243)) for _ in self.pieces]
+            return [(np.empty((0, 243)), np.empty((0, 3)), np.empty((0, 3))) for _ in self.pieces]
         for piece in self.pieces:
             rows = np.arange(start, start + len(piece))
             start += len(piece)
@@ -177,7 +180,11 @@ class _Scan:
                 :_SIGNATURES
             ]
             w = around.signatures(good, flat_atom=flat).astype(np.float64)
-            result.append(w[np.isfinite(w).all(axis=1)])
+            finite = np.isfinite(w).all(axis=1)
+            places, normals = (
+                rows[good[finite]].astype(np.float64) for rows in (self.cloud.offsets[at], around.normals)
+            )
+            result.append((w[finite], places, normals))
         return result
 
     def _noise(self, around: Extraction) -> float:
@@ -199,12 +206,15 @@ class _Scan:
 def _recurrence(
     members: list[int],
     pieces: Sequence[Piece],
-    views: Sequence[View],
+    smooth: tuple[Array, Array],
     pairs: Pairs,
     scores: Array,
     origins: Sequence[Array],
 ) -> Recurrence:
-    """Chain the poses of a group from its first member over the best matches."""
+    """Chain the poses of a group from its first member over the best matches.
+
+    `smooth` are places and normals of the first member, from balls in which noise counts little.
+    """
     pose = {members[0]: np.eye(4)}
     score = {members[0]: 1.0}
     for start, end in ways_from_first(members, scores):
@@ -214,8 +224,8 @@ def _recurrence(
     for member in members:
         shift = origins[pieces[member].scan] - pose[member][:3, :3] @ first
         pose[member][:3, 3] += shift
-    view = views[members[0]]
-    free = free_directions(view.points + first, view.normals)
+    places, normals = smooth
+    free = free_directions(places + first, normals)
     return Recurrence(
         members,
         np.stack([pose[member] for member in members]),
