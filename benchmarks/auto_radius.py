@@ -31,7 +31,7 @@ def cylinder(rng: np.random.Generator) -> Surface:
     turn, y = rng.uniform(-1.2, 1.2, 20_000), rng.uniform(-50, 50, 20_000)
     normals = np.column_stack([np.sin(turn), np.zeros(len(turn)), np.cos(turn)])
     points = 15 * normals + np.column_stack([0 * y, y, 0 * y])
-    return points, normals, np.full(len(turn), 1 / 30), (abs(y) < 30) & (abs(turn) < 0.8)
+    return points, normals, np.full(len(turn), 1 / 30), np.maximum(abs(y) / 30, abs(turn) / 0.8) < 1
 
 
 def plane(rng: np.random.Generator) -> Surface:

@@ -21,6 +21,7 @@ SOLIDS: list[Any] = [
     sim.Cone(0.03, 0.04, 0.01),
     sim.Cone(0.01, 0.04, 0.03),
     sim.Box((0.05, 0.03, 0.07)),
+    sim.Ellipsoid((0.03, 0.02, 0.015)),
     WAVY,
 ]
 
@@ -229,3 +230,10 @@ def test_bad_input_is_one_line(make: Any) -> None:
     with pytest.raises(InvalidInputError) as caught:
         make()
     assert "\n" not in str(caught.value)
+
+
+def test_curvatures_of_an_ellipsoid_at_the_ends_of_its_axes() -> None:
+    a, b, c = 0.03, 0.02, 0.015
+    found = sim.Ellipsoid((a, b, c)).curvatures(np.diag([a, b, c]))
+    expected = [[a / c**2, a / b**2], [b / c**2, b / a**2], [c / b**2, c / a**2]]
+    np.testing.assert_allclose(found, expected, rtol=1e-9)

@@ -20,6 +20,7 @@ from surfsig.extraction import Extraction, FitUsed, Status
 from surfsig.files import read, write
 from surfsig.flat_atom import flat_atom_length
 from surfsig.point_cloud import PointCloud
+from surfsig.recurrences import Recurrence, Recurrences, recurrences
 from surfsig.shapes import FittedShape, fit_cylinder, fit_plane, fit_sphere
 from surfsig.similarity import flipped, similarity, similarity_class, similarity_matrix
 from surfsig.surfaces import PointClass, Surface, Surfaces, surfaces
@@ -34,6 +35,8 @@ __all__ = [
     "InvalidInputError",
     "PointClass",
     "PointCloud",
+    "Recurrence",
+    "Recurrences",
     "Status",
     "Surface",
     "Surfaces",
@@ -49,6 +52,7 @@ __all__ = [
     "flat_atom_length",
     "flipped",
     "read",
+    "recurrences",
     "remove_outliers",
     "similarity",
     "similarity_class",

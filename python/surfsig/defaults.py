@@ -46,3 +46,15 @@ SAMPLING_SEED = 0
 
 INTERVAL = 0.95
 """Probability with which the interval of a fitted radius holds the true one."""
+
+RECURRENCE_POINTS = 100
+"""Fewest points of a piece that is compared with others; with less, little speaks against a match."""
+
+RECURRENCE_SCORE = 0.25
+"""Average score between the pieces of a group, at least."""
+
+RECURRENCE_CONFIDENCE = 0.99
+"""Of the tests whether surfaces differ in size."""
+
+RECURRENCE_SEED = 0
+"""Of the searches for poses: the same pieces give the same result."""

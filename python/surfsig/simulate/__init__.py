@@ -12,6 +12,7 @@ Metres throughout; heights grow along negative z (:mod:`surfsig.simulate.scanner
 """
 
 from .acquisitions import RANDOM_TILT, Acquisition, Jitter, paper_acquisition, paper_acquisitions
+from .ellipsoid import Ellipsoid
 from .height_field import HeightField
 from .part import PART_SCANNER, part, part_scene
 from .poses import UP, facing, inverse, pose, transform, turn
@@ -27,6 +28,7 @@ __all__ = [
     "Box",
     "Cone",
     "Cylinder",
+    "Ellipsoid",
     "HeightField",
     "Hits",
     "Jitter",

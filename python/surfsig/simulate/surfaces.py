@@ -172,7 +172,7 @@ class Sphere(Surface):
 
     def crossings(self, origins: Array, directions: Array) -> Array:
         """See :meth:`Surface.crossings`; k = 2."""
-        return _round_crossings(origins, directions, self.radius)
+        return round_crossings(origins, directions, self.radius)
 
     def implicit(self, points: Array) -> Array:
         """Signed distance."""
@@ -187,7 +187,7 @@ class Sphere(Surface):
         return np.full((len(points), 2), 1.0 / self.radius)
 
 
-def _round_crossings(origins: Array, directions: Array, radius: float) -> Array:
+def round_crossings(origins: Array, directions: Array, radius: float) -> Array:
     """Crossings (2, n) with |p| = radius, in as many dimensions as the arrays have columns.
 
     Taken from the point of closest approach: the textbook discriminant loses half its digits on a ray that
@@ -224,7 +224,7 @@ class Cylinder(Surface):
     def crossings(self, origins: Array, directions: Array) -> Array:
         """See :meth:`Surface.crossings`; k = 4, or 2 when open."""
         half = self.length / 2
-        side = _round_crossings(origins[:, :2], directions[:, :2], self.radius)
+        side = round_crossings(origins[:, :2], directions[:, :2], self.radius)
         rows = [np.where(np.abs(_at(origins, directions, t, 2)) <= half, t, np.inf) for t in side]
         if self.capped:
             rows += [_disc_crossing(origins, directions, level, self.radius) for level in (-half, half)]

@@ -1,0 +1,186 @@
+"""Whether two pieces show the same object: a pose that agrees with what the sensor saw of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from surfsig.recurrences.point_pairs import proposed_poses
+from surfsig.recurrences.view import View
+
+Array = NDArray[np.float64]
+
+_PROPOSALS = 3000
+_FEW, _SOME, _MANY = 60, 240, 600
+"""Points of each piece that poses are judged by, from the first proposals to the last search."""
+_TRIED, _KEPT = 48, 12
+_MUTATIONS = 24
+_TURN, _SHIFT = 0.15, 0.06
+"""Of the first random changes: radians, and parts of the piece's extent; halved each round."""
+_COARSE_ROUNDS, _FINE_ROUNDS = 4, 6
+_SETTLING = 5
+_COARSE, _FINE = (4.0, 8.0), (15.0, 40.0)
+"""What a contradicted and a missing place count, in confirmed ones: at first, when even the best poses are
+not exact; and in the end, when hardly any is left on true ones."""
+_FLAT, _ROUND = 0.7, 0.1
+"""What a match of one plane counts against a round one, as many objects have a flat face; and the spread of
+confirmed normals (1 less the largest eigenvalue of their second moments) from which on it is round."""
+_HOPELESS = 0.1
+"""Scores after the coarse search below which no fine one made a match."""
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """How well one piece lies on another.
+
+    `confirmed`, `contradicted`, `astray` and `missing` are shares of points (see `Sight.judge`): of the
+    source's as the target's sensor sees them, and the other way round, (2,).
+    """
+
+    pose: Array
+    """T_target_source, (4, 4)."""
+    confirmed: Array
+    contradicted: Array
+    astray: Array
+    missing: Array
+    score: float
+    """1 where all is seen from both sides and agrees; 0 and below where nothing speaks for a match."""
+
+
+def align(source: View, target: View, rng: np.random.Generator) -> Alignment | None:
+    """Find the pose T_target_source that both pieces agree with most; None where that is hopeless."""
+    poses = proposed_poses(source.pairs, target.pairs, _PROPOSALS, rng)
+    if not len(poses):
+        return None
+    few = (source.sample(_FEW), target.sample(_FEW))
+    poses, _ = _best(poses, _scores(poses, few, 2.0, _COARSE), _TRIED)
+    some = (source.sample(_SOME), target.sample(_SOME))
+    poses, score = _best(poses, _scores(poses, some, 1.0, _COARSE), _KEPT)
+    for number in range(_COARSE_ROUNDS):
+        poses = _mutated(poses, target, 0.5**number, rng)
+        poses, score = _best(poses, _scores(poses, some, 1.0, _COARSE), _KEPT)
+    if score[0] < _HOPELESS:
+        return None
+    many = (source.sample(_MANY), target.sample(_MANY))
+    settled = [_settled(pose, many) for pose in poses[: _KEPT // 2]]
+    return refined(np.concatenate([poses, settled]), source, target, rng)
+
+
+def refined(poses: Array, source: View, target: View, rng: np.random.Generator) -> Alignment:
+    """Search around good poses T_target_source, (k, 4, 4), for the one that both pieces agree with most."""
+    many = (source.sample(_MANY), target.sample(_MANY))
+    for number in range(_FINE_ROUNDS):
+        poses, _ = _best(poses, _scores(poses, many, 1.0, _FINE), max(1, _KEPT >> (1 + number // 2)))
+        poses = _mutated(poses, target, 0.5 ** (_COARSE_ROUNDS - 2 + number), rng)
+    poses, _ = _best(poses, _scores(poses, many, 1.0, _FINE), 1)
+    settled = _settled(poses[0], (source, target))
+    return max(
+        (measured(pose, source, target) for pose in (poses[0], settled)), key=lambda found: found.score
+    )
+
+
+def measured(pose: Array, source: View, target: View) -> Alignment:
+    """Judge a pose T_target_source by all points of both pieces."""
+    shares = _shares(pose[None], (source, target), 1.0)[..., 0]
+    confirmed, contradicted, astray, missing = shares
+    score = float(_agreement(shares, _FINE)) * _weight(pose, source, target)
+    return Alignment(pose, confirmed, contradicted, astray, missing, score)
+
+
+def _shares(poses: Array, views: tuple[View, View], looseness: float) -> Array:
+    """Give the shares (4, 2, poses) of confirmed, contradicted, astray and missing points, there and back."""
+    sides = []
+    for moves, moving, still in ((poses, *views), (np.linalg.inv(poses), *views[::-1])):
+        turned = moves[:, :3, :3].swapaxes(1, 2)
+        places = moving.points @ turned + moves[:, None, :3, 3]
+        judged = still.sight.judge(places, moving.normals @ turned, looseness * still.tolerance)
+        sides.append([part.mean(axis=1) for part in judged])
+    return np.asarray(sides).swapaxes(0, 1)
+
+
+def _agreement(shares: Array, penalties: tuple[float, float]) -> Array:
+    confirmed, contradicted, astray, missing = shares
+    wrong = penalties[0] * contradicted + penalties[1] * missing + astray
+    return np.asarray((confirmed - wrong).mean(axis=0))
+
+
+def _scores(
+    poses: Array, views: tuple[View, View], looseness: float, penalties: tuple[float, float]
+) -> Array:
+    return _agreement(_shares(poses, views, looseness), penalties)
+
+
+def _weight(pose: Array, source: View, target: View) -> float:
+    """Give what the confirmed part of a match counts: less where it is one plane."""
+    places, normals = _placed(pose, source)
+    confirmed = normals[target.sight.judge(places, normals, target.tolerance)[0]]
+    if not len(confirmed):
+        return 0.0
+    spread = 1.0 - float(np.linalg.eigvalsh(confirmed.T @ confirmed / len(confirmed))[-1])
+    return _FLAT + (1.0 - _FLAT) * min(spread / _ROUND, 1.0)
+
+
+def _best(poses: Array, score: Array, most: int) -> tuple[Array, Array]:
+    order = np.argsort(-score, kind="stable")[:most]
+    return poses[order], score[order]
+
+
+def _mutated(poses: Array, target: View, step: float, rng: np.random.Generator) -> Array:
+    """Give the poses, and each turned about the target's middle and shifted at random."""
+    count = len(poses) * _MUTATIONS
+    motion = np.tile(np.eye(4), (count, 1, 1))
+    turn = Rotation.from_rotvec(rng.normal(0.0, _TURN * step, (count, 3))).as_matrix()
+    shift = rng.normal(0.0, _SHIFT * step * target.extent, (count, 3))
+    motion[:, :3, :3] = turn
+    motion[:, :3, 3] = target.middle - turn @ target.middle + shift
+    return np.concatenate([poses, motion @ np.repeat(poses, _MUTATIONS, axis=0)])
+
+
+def _settled(pose: Array, views: tuple[View, View]) -> Array:
+    """Refine a pose by point-to-plane least squares over the confirmed points, there and back.
+
+    The correspondences are those of the depth images. Where the points leave a direction free (along a
+    cylinder, in a plane), the least change is taken, none in that direction.
+    """
+    source, target = views
+    for _ in range(_SETTLING):
+        moved, normals = _placed(pose, source)
+        kept, foot, normal = target.sight.correspondences(moved, normals, target.tolerance)
+        rows = [_row(moved[kept], normal[kept])]
+        heights = [np.einsum("ij,ij->i", moved - foot, normal)[kept]]
+        back, normals = _placed(np.asarray(np.linalg.inv(pose)), target)
+        kept, foot, normal = source.sight.correspondences(back, normals, source.tolerance)
+        normal = normal[kept] @ pose[:3, :3].T
+        # The target's point stays and the source's surface moves: the opposite sign.
+        rows.append(_row(target.points[kept], normal))
+        offset = target.points[kept] - (foot[kept] @ pose[:3, :3].T + pose[:3, 3])
+        heights.append(-np.einsum("ij,ij->i", offset, normal))
+        design, height = np.concatenate(rows), np.concatenate(heights)
+        if len(design) < 6:
+            break
+        middle, unit = target.middle, target.extent
+        # About the middle and in units of the extent, so that turns and shifts are alike.
+        design[:, :3] = (design[:, :3] - np.cross(middle, design[:, 3:])) / unit
+        change, *_ = np.linalg.lstsq(design, -height, rcond=_FREE)
+        turn = Rotation.from_rotvec(change[:3] / unit).as_matrix()
+        motion = np.eye(4)
+        motion[:3, :3] = turn
+        motion[:3, 3] = middle - turn @ middle + change[3:]
+        pose = motion @ pose
+    return pose
+
+
+_FREE = 0.03
+"""Of the largest singular value; directions below it are left alone."""
+
+
+def _placed(pose: Array, view: View) -> tuple[Array, Array]:
+    return view.points @ pose[:3, :3].T + pose[:3, 3], view.normals @ pose[:3, :3].T
+
+
+def _row(points: Array, normals: Array) -> Array:
+    """Give the change of heights for small turns and shifts, (n, 6)."""
+    return np.hstack([np.cross(points, normals), normals])

@@ -1,0 +1,104 @@
+"""Which pieces match which: all pairs, first by signatures, then by geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfsig.recurrences.alignment import Alignment, align, refined
+from surfsig.recurrences.view import View
+
+Array = NDArray[np.float64]
+
+_ALIKE = 0.7
+"""Share of a piece's signatures that the other must have too, of the piece where it is larger."""
+_EQUAL = 0.99
+"""zeta (eq. 12) of signatures that count as the same; stricter than the paper's "optimal", as here they need
+not be alike but equal, size included."""
+_DOUBTFUL = 0.5
+"""Scores below which a pose by way of a third piece is tried, too."""
+_DETOURS = 3
+_WORTHWHILE = 0.25
+"""Scores from which on an alignment is good for a detour."""
+
+Pairs = dict[tuple[int, int], Alignment]
+"""Alignments of the pairs (source, target), source < target, that match at all."""
+
+
+def matched_pairs(
+    views: Sequence[View],
+    signatures: Sequence[Array],
+    seed: int,
+    progress: Callable[[int, int], object] | None,
+) -> Pairs:
+    """Align all pairs of pieces whose signatures are alike.
+
+    Parameters
+    ----------
+    views
+        The pieces.
+    signatures
+        Of each some signatures, (k, 243).
+    seed
+        Of the searches.
+    progress
+        Called with the pairs done, and of all.
+    """
+    pairs: Pairs = {}
+    count = len(views) * (len(views) - 1) // 2
+    numbers = [(i, j) for j in range(len(views)) for i in range(j)]
+    for done, (i, j) in enumerate(numbers):
+        if common_share(signatures[i], signatures[j]) >= _ALIKE:
+            found = align(views[i], views[j], np.random.default_rng([seed, i, j]))
+            if found is not None:
+                pairs[i, j] = found
+        if progress is not None:
+            progress(done + 1, count)
+    _take_detours(pairs, views, seed)
+    return pairs
+
+
+def common_share(a: Array, b: Array) -> float:
+    """Give the larger one of the shares of two sets of signatures that have an equal one in the other.
+
+    A piece that is half hidden has fewer signatures than a
+    whole one; all that it has should be among those of the other.
+    """
+    if not len(a) or not len(b):
+        return 1.0
+    unit_a, unit_b = (rows / np.linalg.norm(rows, axis=1, keepdims=True) for rows in (a, b))
+    equal = np.abs(unit_a @ unit_b.T) >= _EQUAL
+    return float(max(equal.any(axis=1).mean(), equal.any(axis=0).mean()))
+
+
+def pose_between(pairs: Pairs, source: int, target: int) -> Array:
+    """Give the pose T_target_source of a pair in either order."""
+    if (source, target) in pairs:
+        return pairs[source, target].pose
+    return np.asarray(np.linalg.inv(pairs[target, source].pose))
+
+
+def scores_of(pairs: Pairs, count: int) -> Array:
+    """Give the scores as a symmetric matrix, 0 where nothing matches."""
+    scores = np.zeros((count, count))
+    for (i, j), found in pairs.items():
+        scores[i, j] = scores[j, i] = max(found.score, 0.0)
+    return scores
+
+
+def _take_detours(pairs: Pairs, views: Sequence[View], seed: int) -> None:
+    """Try, for doubtful pairs, the poses by way of third pieces that match both well."""
+    scores = scores_of(pairs, len(views))
+    for j in range(len(views)):
+        for i in range(j):
+            if scores[i, j] >= _DOUBTFUL:
+                continue
+            both = np.minimum(scores[i], scores[j])
+            via = [k for k in np.argsort(-both, kind="stable")[:_DETOURS] if both[k] >= _WORTHWHILE]
+            if via:
+                poses = np.stack([pose_between(pairs, k, j) @ pose_between(pairs, i, k) for k in via])
+                found = refined(poses, views[i], views[j], np.random.default_rng([seed, i, j, 1]))
+                if found.score > scores[i, j]:
+                    pairs[i, j] = found

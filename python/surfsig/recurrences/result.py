@@ -1,0 +1,133 @@
+"""What recurs: groups of pieces with poses, and of equal surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfsig.recurrences.equal_surfaces import EqualSurfaces
+from surfsig.recurrences.free_directions import FreeDirection
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Piece:
+    """A part of a scan that hangs together: an object, or what is seen of it."""
+
+    scan: int
+    """Which scan it is in."""
+    points: NDArray[np.int64]
+    """The numbers of its points, ascending."""
+    surfaces: list[int]
+    """The numbers of the surfaces that it has points of."""
+    center: Array
+    """(3,), mean of its points."""
+
+    def __repr__(self) -> str:
+        surfaces = f", surfaces {self.surfaces}" if self.surfaces else ", free-form"
+        return f"Piece(scan {self.scan}, {len(self.points)} points{surfaces})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Recurrence:
+    """Pieces that show the same object."""
+
+    pieces: list[int]
+    """The numbers of the pieces, the first ones first."""
+    poses: Array
+    """T_member_first, (m, 4, 4): what brings the first piece onto each; the identity for itself."""
+    scores: Array
+    """(m,): how well each agrees with the one that its pose was found by, 0 to 1; 1 for the first."""
+    free_directions: list[FreeDirection]
+    """Motions along which the first piece slips over itself, its rims left aside: there, poses rest on rims
+    alone, or on nothing."""
+
+    def __len__(self) -> int:
+        """Return the number of members."""
+        return len(self.pieces)
+
+    def __repr__(self) -> str:
+        free = "; ".join(str(direction) for direction in self.free_directions) or "no free direction"
+        return f"Recurrence({len(self)} pieces {self.pieces}, score {self.scores.mean():.2f}, {free})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Recurrences:
+    """What occurs more than once in a scan, or in several; a sequence of `Recurrence`."""
+
+    groups: list[Recurrence]
+    """Pieces that recur, by their first ones."""
+    pieces: list[Piece]
+    """All pieces of all scans."""
+    equal_surfaces: list[EqualSurfaces]
+    """Surfaces of one kind and size."""
+    labels: list[NDArray[np.int32]]
+    """Of each scan the number of each point's piece, (n,); -1 for supports and what is too small."""
+    scores: Array
+    """(pieces, pieces), how well each two agree, 0 to 1."""
+
+    @property
+    def group_labels(self) -> list[NDArray[np.int32]]:
+        """Of each scan the number of each point's group, (n,); -1 for what does not recur."""
+        group_of = np.full(len(self.pieces) + 1, -1, np.int32)
+        for number, group in enumerate(self.groups):
+            group_of[group.pieces] = number
+        return [group_of[label] for label in self.labels]
+
+    def __len__(self) -> int:
+        """Return the number of groups."""
+        return len(self.groups)
+
+    def __getitem__(self, number: int) -> Recurrence:
+        return self.groups[number]
+
+    def __repr__(self) -> str:
+        recurring = sum(len(group) for group in self.groups)
+        lines = [
+            f"Recurrences({recurring} of {len(self.pieces)} pieces in {len(self.groups)} groups, "
+            f"{len(self.equal_surfaces)} sizes of equal surfaces)",
+            *(f"  {number}: {group!r}" for number, group in enumerate(self.groups)),
+            *(f"  {surfaces!r}" for surfaces in self.equal_surfaces),
+        ]
+        return "\n".join(lines)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Give the pieces that recur as a pandas DataFrame, a row each; the index has the pieces' numbers.
+
+        Returns
+        -------
+        pandas.DataFrame
+            group, scan, points, x, y, z (its mean), score, qx, qy, qz, qw, tx, ty, tz (T_member_first: unit
+            quaternion, shift), free (the free directions in words).
+
+        Raises
+        ------
+        InvalidInputError
+            If pandas is not installed.
+        """
+        from scipy.spatial.transform import Rotation
+
+        from surfsig.convert.libraries import library
+
+        pandas = library("pandas", "pandas", "pandas")
+        rows: list[dict[str, Any]] = []
+        for number, group in enumerate(self.groups):
+            free = "; ".join(str(direction) for direction in group.free_directions)
+            for member, pose, score in zip(group.pieces, group.poses, group.scores, strict=True):
+                piece = self.pieces[member]
+                row = {"piece": member, "group": number, "scan": piece.scan, "points": len(piece.points)}
+                row |= dict(zip("xyz", piece.center, strict=True)) | {"score": score}
+                turn = Rotation.from_matrix(pose[:3, :3]).as_quat()
+                row |= dict(zip(("qx", "qy", "qz", "qw"), turn, strict=True))
+                row |= dict(zip(("tx", "ty", "tz"), pose[:3, 3], strict=True)) | {"free": free}
+                rows.append(row)
+        names = ["piece", "group", "scan", "points", "x", "y", "z", "score"]
+        names += ["qx", "qy", "qz", "qw", "tx", "ty", "tz", "free"]
+        return pandas.DataFrame(rows, columns=names).set_index("piece")

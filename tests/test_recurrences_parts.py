@@ -1,0 +1,203 @@
+"""The parts of recurrences: equal surfaces, free directions, groups, what the sensor saw."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from recurrences import adjusted_rand_index
+
+from surfsig.point_cloud import PointCloud
+from surfsig.recurrences.equal_surfaces import equal_surfaces
+from surfsig.recurrences.free_directions import free_directions, free_directions_of_surface
+from surfsig.recurrences.grouping import groups_of, ways_from_first
+from surfsig.recurrences.matching import common_share
+from surfsig.recurrences.pieces import pieces_of, point_spacing
+from surfsig.recurrences.sight import sight_of
+from surfsig.surfaces import Surface, Surfaces
+from surfsig.surfaces.surface import described
+
+Array = NDArray[np.float64]
+
+
+def surface(kind: str, radius: float, std: float, *, axis: Array | None = None, **sizes: float) -> Surface:
+    """Make a surface at a place that depends on its radius."""
+    place = np.array([radius, 2.0, 3.0])
+    entry = {
+        "kind": kind,
+        "point": place,
+        "axis": np.array([0.0, 0.0, 1.0]) if axis is None else axis,
+        "radius": radius,
+        "radius_std": std,
+        "major_radius": sizes.get("major_radius", np.nan),
+        "major_radius_std": std,
+        "half_angle": sizes.get("half_angle", np.nan),
+        "half_angle_std": std,
+        "deviation": 1e-4,
+        "count": 12,
+    }
+    points = np.random.default_rng(0).normal(size=(12, 3))
+    made = described(entry, points, np.zeros(3))
+    return dataclasses.replace(made, center=place)
+
+
+def found(*surfaces: Surface) -> Surfaces:
+    """Put surfaces into a scan without points."""
+    return Surfaces(PointCloud(np.zeros((0, 3))), np.zeros(0, np.int32), list(surfaces))
+
+
+def test_equal_surfaces_are_pooled_and_others_kept_apart() -> None:
+    scans = [
+        found(surface("sphere", 0.020, 1e-5), surface("sphere", 0.015, 1e-5)),
+        found(surface("sphere", 0.02002, 1e-5), surface("cylinder", 0.020, 1e-5)),
+    ]
+    (group,) = equal_surfaces(scans, 0.99)
+    assert group.members == [(0, 0), (1, 0)]
+    assert group.size == {"radius": pytest.approx(0.02001)}
+    assert group.size_std["radius"] == pytest.approx(1e-5 / np.sqrt(2))
+    np.testing.assert_allclose(group.poses[1] @ [0.020, 2, 3, 1], [0.02002, 2, 3, 1], atol=1e-12)
+    assert "2 x sphere, radius=0.02001" in repr(group)
+
+
+def test_a_chain_of_sizes_does_not_join_its_ends() -> None:
+    # Neighbours differ by 2.1 standard errors of their difference, the ends by 12.7.
+    sizes = 0.02 + 3e-5 * np.arange(7)
+    groups = equal_surfaces([found(*(surface("sphere", size, 1e-5) for size in sizes))], 0.99)
+    assert groups
+    assert max(len(group) for group in groups) <= 3
+
+
+def test_planes_and_surfaces_without_errors_have_no_size_to_compare() -> None:
+    ball = surface("sphere", 0.02, np.nan)
+    scan = found(*[dataclasses.replace(ball, kind="plane", radius=np.nan)] * 2, ball, ball)
+    assert equal_surfaces([scan], 0.99) == []
+
+
+def test_equal_cylinders_are_brought_axis_to_axis() -> None:
+    tilted = np.array([0.6, 0.0, -0.8])
+    scan = found(surface("cylinder", 0.02, 1e-5), surface("cylinder", 0.02001, 1e-5, axis=tilted))
+    (group,) = equal_surfaces([scan], 0.99)
+    assert abs(group.poses[1][:3, :3] @ [0, 0, 1] @ tilted) == pytest.approx(1.0)
+    assert [direction.motion for direction in group.free_directions] == ["turn", "slide"]
+
+
+def test_cones_are_equal_by_their_angle_and_meet_at_their_apex() -> None:
+    scan = found(surface("cone", 0.02, 1e-4, half_angle=0.5), surface("cone", 0.01, 1e-4, half_angle=0.5001))
+    (group,) = equal_surfaces([scan], 0.99)
+    apex = [(r, 2.0, 3.0 - r / np.tan(angle), 1.0) for r, angle in ((0.02, 0.5), (0.01, 0.5001))]
+    np.testing.assert_allclose(group.poses[1] @ apex[0], apex[1], atol=1e-12)
+
+
+def directions_of(points: Array, normals: Array) -> list[str]:
+    """Name the free directions of oriented points."""
+    return [direction.motion for direction in free_directions(points, normals)]
+
+
+def test_free_directions_of_points_on_simple_surfaces() -> None:
+    rng = np.random.default_rng(3)
+    directions = rng.normal(size=(400, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    center = np.array([0.3, -0.2, 0.5])
+    (turn,) = free_directions(center + 0.02 * directions, directions)
+    assert turn.motion == "turn"
+    np.testing.assert_allclose(turn.point, center, atol=1e-9)
+    assert np.isnan(turn.axis).all()
+
+    around = directions.copy()
+    around[:, 2] = 0.0
+    around /= np.linalg.norm(around, axis=1, keepdims=True)
+    heights = rng.uniform(-0.03, 0.03, 400)
+    rod = center + 0.02 * around + np.outer(heights, [0, 0, 1])
+    turn, slide = free_directions(rod, around)
+    assert (turn.motion, slide.motion) == ("turn", "slide")
+    np.testing.assert_allclose(np.abs([turn.axis, slide.axis]), [[0, 0, 1]] * 2, atol=1e-6)
+    np.testing.assert_allclose(turn.point[:2], center[:2], atol=1e-7)
+
+    # A cone's normals lean towards its axis: it cannot slide.
+    narrowing = center + (0.02 + heights)[:, None] * around + np.outer(heights, [0, 0, 1])
+    leaning = (around - [0, 0, 1]) / np.sqrt(2.0)
+    assert directions_of(narrowing, leaning) == ["turn"]
+    flat = np.column_stack([rng.uniform(-1, 1, (400, 2)), np.zeros(400)])
+    assert directions_of(flat, np.tile([0.0, 0.0, 1.0], (400, 1))) == ["turn", "slide", "slide"]
+    # Three faces of a box leave nothing free.
+    faces = np.concatenate([np.roll(flat, k, axis=1) for k in range(3)])
+    assert directions_of(faces, np.repeat(np.eye(3)[[2, 0, 1]], 400, axis=0)) == []
+
+
+def test_free_directions_are_named() -> None:
+    ball, rod = (
+        free_directions_of_surface(kind, np.zeros(3), np.array([0.0, 0.0, 1.0]))
+        for kind in ("sphere", "cylinder")
+    )
+    assert [str(direction) for direction in ball] == ["turns about (0, 0, 0)"]
+    assert [str(direction) for direction in rod] == [
+        "turns about the axis (0, 0, 1) through (0, 0, 0)",
+        "slides along (0, 0, 1)",
+    ]
+
+
+def test_one_false_match_does_not_join_two_groups() -> None:
+    scores = np.zeros((6, 6))
+    scores[:3, :3] = scores[3:, 3:] = 0.6
+    scores[0, 3] = scores[3, 0] = 0.7
+    scores[0, 1] = scores[1, 0] = 0.8
+    scores[4, 3] = scores[3, 4] = 0.8
+    assert groups_of(scores, 0.3) == [[0, 1, 2], [3, 4, 5]]
+    assert groups_of(scores[:1, :1], 0.3) == [[0]]
+
+
+def test_poses_are_chained_over_the_best_matches() -> None:
+    scores = np.array([[0, 0.2, 0.9], [0.2, 0, 0.8], [0.9, 0.8, 0]])
+    assert ways_from_first([0, 1, 2], scores) == [(0, 2), (2, 1)]
+
+
+def test_signatures_in_common_count_for_the_piece_that_has_fewer() -> None:
+    rows = np.eye(243)[:4]
+    assert common_share(rows, rows[:2]) == 1.0
+    assert common_share(rows[:2], rows[1:3]) == 0.5
+    assert common_share(rows[:2], rows[2:]) == 0.0
+
+
+def test_adjusted_rand_index() -> None:
+    kinds = np.array([0, 0, 1, 1])
+    assert adjusted_rand_index(kinds, 1 - kinds) == 1.0
+    # Hubert and Arabie: no pair in common, where a third of one is expected.
+    assert adjusted_rand_index(kinds, np.array([0, 1, 0, 1])) == pytest.approx(-0.5)
+
+
+def board(side: int = 60) -> Array:
+    """Make a square of points, one apart, on z = 0."""
+    steps = np.arange(side, dtype=np.float64)
+    x, y = np.meshgrid(steps, steps, indexing="ij")
+    return np.column_stack([x.ravel(), y.ravel(), np.zeros(side * side)])
+
+
+def test_pieces_are_what_a_support_carries() -> None:
+    table = board()
+    bricks = [board(6) + np.array([x, y, 2.5]) for x, y in ((5, 5), (40, 8), (20, 40))]
+    points = np.concatenate([table, *bricks])
+    plane = (np.arange(len(table)), np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.01)
+    pieces, support = pieces_of(points, [plane], point_spacing(points), 20)
+    assert [len(piece) for piece in pieces] == [36, 36, 36]
+    np.testing.assert_array_equal(np.flatnonzero(support), np.arange(len(table)))
+
+
+def test_a_sensor_sees_what_is_on_hidden_through_and_missing() -> None:
+    """A square in front of a wall, seen from above, with a strip beside it where nothing was measured."""
+    wall, square = board(), board(20) + np.array([10.0, 20.0, 10.0])
+    wall = wall[(wall[:, 0] < 30) | (wall[:, 0] > 36)]
+    points = np.concatenate([wall, square])
+    normals = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    own = np.arange(len(wall), len(points))
+    sight = sight_of(own, points, normals, np.array([20.0, 30.0, 1e4]), 1.0)
+    # On the square, just below it, far below it; in front of the wall; where nothing was measured.
+    places = np.array([[15, 30, 10.1], [15, 30, 9.0], [15, 30, 2.0], [26, 45, 8.0], [33, 30, 10.0]])
+    judged = sight.judge(places, np.tile([0.0, 0.0, 1.0], (5, 1)), 0.3)
+    confirmed, contradicted, astray, missing = (np.flatnonzero(part).tolist() for part in judged)
+    assert (confirmed, contradicted, astray, missing) == ([0], [3], [1], [4])
+    # A surface that turns its back to the sensor is not seen: neither confirmed nor missing.
+    judged = sight.judge(places[[0, 4]], np.tile([0.0, 0.0, -1.0], (2, 1)), 0.3)
+    assert not judged[0].any()
+    assert not judged[3].any()
