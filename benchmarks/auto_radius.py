@@ -38,7 +38,7 @@ def plane(rng: np.random.Generator) -> Surface:
     """Make the same of a plane."""
     points = np.column_stack([rng.uniform(-50, 50, (20_000, 2)), np.zeros(20_000)])
     normals = np.tile([0.0, 0.0, 1.0], (20_000, 1))
-    return points, normals, np.zeros(20_000), (abs(points) < 30).all(axis=1)
+    return points, normals, np.zeros(20_000), np.abs(points).max(axis=1) < 30
 
 
 def waves(rng: np.random.Generator) -> Surface:

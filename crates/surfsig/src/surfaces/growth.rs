@@ -37,6 +37,9 @@ const LARGE: usize = 2000;
 /// Extent of a curved surface in units of its radius.
 const LEAST_TURN: f64 = 0.15;
 
+/// Standard deviation of a surface's points in units of its extent.
+const THICKEST: f64 = 0.05;
+
 /// Points whose neighbours are looked at to tell a surface from a line, and the second spread of a line's neighbours in
 /// units of the first (variances).
 const LOOKED_AT: usize = 100;
@@ -121,12 +124,13 @@ impl Grower<'_> {
             if simpler.deviation <= self.scene.floor || simpler.members.len() < self.fewest / SMALL {
                 break;
             }
-            if let Some(start) = self.more_complex(kind, simpler)
-                && let Some(region) = self.grow(start, &simpler.members, noise)
-                && region.is_better_than(simpler, self.scene)
-            {
-                best = Some(region);
-            }
+            // The points of the simpler surface are chosen to be near it; those around the seed are not.
+            let better = [&simpler.members[..], &first].into_iter().find_map(|from| {
+                let start = self.more_complex(kind, simpler, from)?;
+                let region = self.grow(start, from, noise)?;
+                region.is_better_than(simpler, self.scene).then_some(region)
+            });
+            best = better.or(best);
         }
         match best {
             Some(region) if region.is_smooth(self.scene) && region.members.len() >= self.fewest => Ok(region),
@@ -154,13 +158,16 @@ impl Grower<'_> {
         (deviation <= 2.0 * noise + self.scene.floor).then_some(primitive)
     }
 
-    /// A surface of a kind with more parameters near the points of a simpler one, if it explains them much better.
-    fn more_complex(&self, kind: SurfaceKind, simpler: &Region) -> Option<Primitive> {
-        let (points, normals) = self.scene.sample(&simpler.members, SAMPLE_OF_KIND);
-        let (primitive, deviation) =
-            fitted(kind, &points, &normals, &[simpler.primitive], self.scene.patience(simpler.noise))?;
+    /// A surface of a kind with more parameters near some points, if it explains them much better than a simpler one.
+    fn more_complex(&self, kind: SurfaceKind, simpler: &Region, points: &[u32]) -> Option<Primitive> {
+        let (points, normals) = self.scene.sample(points, SAMPLE_OF_KIND);
+        let patience = self.scene.patience(simpler.noise);
+        let (primitive, deviation) = fitted(kind, &points, &normals, &[simpler.primitive], patience)?;
+        let chart = simpler.primitive.chart();
+        let squares: f64 = points.iter().map(|point| chart.distance(point).powi(2)).sum();
+        let before = (squares / points.len() as f64).sqrt();
         let more = kind.parameters() - simpler.primitive.kind.parameters();
-        let gain = points.len() as f64 * (simpler.deviation.max(1e-300) / deviation.max(1e-300)).ln();
+        let gain = points.len() as f64 * (before.max(1e-300) / deviation.max(1e-300)).ln();
         (gain > EVIDENCE * more as f64).then_some(primitive)
     }
 
@@ -191,7 +198,7 @@ impl Grower<'_> {
         }
         region.members = scene.largest_part(&region.members, self.seen, self.inside);
         region.fit(scene, SAMPLE)?;
-        (region.is_bent(scene) && !region.is_line(scene, self.inside)).then_some(region)
+        (region.is_plausible(scene) && !region.is_line(scene, self.inside)).then_some(region)
     }
 }
 
@@ -245,10 +252,13 @@ impl Region {
         NEAR * self.deviation.max(0.3 * self.noise).min(ROUGHEST * self.noise) + scene.floor
     }
 
-    /// Whether it is a plane, or turns enough within its extent to be told from one: no plane is a huge cylinder.
-    pub fn is_bent(&self, scene: &Scene) -> bool {
+    /// Whether it is thin against its extent, and a plane, or turns enough within its extent to be told from one: no
+    /// plane is a huge cylinder, and no cloud of noise a thick sphere.
+    pub fn is_plausible(&self, scene: &Scene) -> bool {
         let (points, _) = scene.sample(&self.members, SAMPLE_OF_KIND);
-        self.primitive.kind == SurfaceKind::Plane || extent(&points) >= LEAST_TURN * self.primitive.radius
+        let extent = extent(&points);
+        let bent = self.primitive.kind == SurfaceKind::Plane || extent >= LEAST_TURN * self.primitive.radius;
+        bent && self.deviation <= THICKEST * extent
     }
 
     /// Whether most of its points have their neighbours along a line only: one line of a lidar lies on the cone that its

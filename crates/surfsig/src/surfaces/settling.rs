@@ -66,7 +66,7 @@ fn joined(scene: &Scene, large: &Region, small: &Region) -> Option<Region> {
         let mut joined =
             Region { members: members.clone(), noise: large.noise.max(small.noise), ..of_kind.clone() };
         joined.fit(scene, SAMPLE)?;
-        (joined.is_smooth(scene) && joined.is_bent(scene)).then_some(joined)
+        (joined.is_smooth(scene) && joined.is_plausible(scene)).then_some(joined)
     })
 }
 
