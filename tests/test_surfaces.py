@@ -67,12 +67,12 @@ def test_sizes(found: Surfaces) -> None:
 def test_a_radius_has_its_interval(found: Surfaces) -> None:
     for surface, radius in zip(found, (math.nan, 0.2, 0.3), strict=True):
         low, high = surface.interval
-        if math.isnan(surface.radius_std):
+        if surface.kind == "plane":
             assert math.isnan(low)
             assert math.isnan(high)
         else:
             assert low < radius < high
-            assert surface.covariance.shape[0] == {"cylinder": 5, "sphere": 4}[surface.kind]
+        assert len(surface.covariance) == {"plane": 3, "cylinder": 5, "sphere": 4}[surface.kind]
 
 
 def test_distances_are_those_of_the_members(scene: surface_scenes.Known, found: Surfaces) -> None:

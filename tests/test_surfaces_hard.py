@@ -16,12 +16,7 @@ HARD = {
 }
 
 
-THICK = pytest.mark.xfail(reason="surfaces grow through noise that is as thick as the scan", strict=True)
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=THICK) if name == "noise" else name for name in HARD]
-)
+@pytest.mark.parametrize("name", list(HARD))
 def test_nothing_is_found_where_nothing_is(name: str) -> None:
     found = surfsig.surfaces(HARD[name])
     assert len(found) == 0

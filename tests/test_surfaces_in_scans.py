@@ -33,6 +33,16 @@ def test_the_lidar_sphere(shared_data: Path, number: int) -> None:
     assert sphere.count > 100
 
 
+def test_three_scans_of_one_sphere_agree_within_their_intervals(shared_data: Path) -> None:
+    scans = [shared_data / "surfaces" / f"lidar_sphere_{number}.xyz" for number in (1, 2, 3)]
+    spheres = [found_in(scan, "sphere", 0.295) for scan in scans]
+    low = max(sphere.interval[0] for sphere in spheres)
+    high = min(sphere.interval[1] for sphere in spheres)
+    assert low < high
+    for sphere in spheres:
+        assert 0.001 < sphere.radius_std < 0.006
+
+
 @pytest.mark.xfail(reason=NOISY)
 def test_the_gym_ball(shared_data: Path) -> None:
     ball = found_in(shared_data / "surfaces" / "gym_ball.xyz", "sphere", 0.341)

@@ -38,7 +38,7 @@ const LARGE: usize = 2000;
 const LEAST_TURN: f64 = 0.15;
 
 /// Standard deviation of a surface's points in units of its extent.
-const THICKEST: f64 = 0.05;
+const THICKEST: f64 = 0.035;
 
 /// Points whose neighbours are looked at to tell a surface from a line, and the second spread of a line's neighbours in
 /// units of the first (variances).

@@ -24,6 +24,9 @@ const SURROUNDINGS: usize = 1000;
 /// Noise in units of what a quarter of all estimates stay below, each of [`LOCAL`] points.
 const QUARTER: f64 = 1.15;
 
+/// Standard deviation of points that fill a ball instead of a surface in it, in units of its radius, and more.
+const THICK: f64 = 0.32;
+
 /// Label of a point that belongs to no surface.
 pub(super) const NONE: i32 = -1;
 
@@ -105,7 +108,8 @@ impl Scene {
             let unknowns = if local.fit_used[entry] == FitUsed::Quadric { 9.0 } else { 6.0 };
             let freedom = f64::from(local.count[entry]) - unknowns;
             let noise = f64::from(local.residual[entry]) * (f64::from(local.count[entry]) / freedom).sqrt();
-            let known = freedom > 0.0 && noise.is_finite() && !is_line(local, entry);
+            let thin = noise <= THICK * f64::from(local.radii[entry]);
+            let known = freedom > 0.0 && thin && !is_line(local, entry);
             self.noise[point] = if known { self.known.unwrap_or(noise) } else { f64::INFINITY };
             let normal = local.normals[entry].map(f64::from);
             self.normals[point] = if known { Vector::from(normal) } else { Vector::repeat(f64::NAN) };
