@@ -72,6 +72,9 @@ def test_progress_counts_every_ball() -> None:
     seen: list[tuple[int, int]] = []
     extract_radii(bumps(5_000), [0.05, 0.03], progress=lambda done, total: seen.append((done, total)))
     assert seen[-1] == (10_000, 10_000)
+    # Of a dense cloud each radius has a pass of its own.
+    extract_radii(bumps(60_000), [0.05, 0.03], progress=lambda done, total: seen.append((done, total)))
+    assert seen[-1] == (120_000, 120_000)
 
 
 @pytest.mark.parametrize(

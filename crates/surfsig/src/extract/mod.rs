@@ -24,7 +24,7 @@ pub use status::Status;
 
 use crate::cell_index::CellIndex;
 use crate::fit::{FitAxes, FitKind};
-use crate::hierarchy::{DENSE, DENSE_FOR_SEVERAL};
+use crate::hierarchy::DENSE;
 use crate::simd::InstructionSet;
 use crate::threads::with_threads;
 use crate::{Error, PointCloud, Radius};
@@ -239,8 +239,7 @@ fn run(
     let asked = elsewhere.as_ref().unwrap_or(&index);
     let own_radii = !matches!(neighborhood, Neighborhood::Ball(_));
     let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
-    let dense = (matches!(neighborhood, Neighborhood::Ball(_)) && !options.robust)
-        .then_some(if balls.radii.len() > 1 { DENSE_FOR_SEVERAL } else { DENSE });
+    let dense = (matches!(neighborhood, Neighborhood::Ball(_)) && !options.robust).then_some(DENSE);
     let mut shares = shares(&index, asked, dense);
     let mut left = Vec::new();
     if balls.radii.len() > 1 {

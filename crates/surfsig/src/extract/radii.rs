@@ -1,6 +1,6 @@
 //! Balls of several radii around every query, in one pass over the points.
 
-use super::{Balls, ExtractOptions, Extraction, Found, Monitor, Neighborhood, Queries, check, run};
+use super::{Balls, ExtractOptions, Extraction, Found, Monitor, Neighborhood, Queries, Status, check, run};
 use crate::threads::with_threads;
 use crate::{Error, PointCloud, Radius};
 
@@ -79,15 +79,30 @@ pub(super) fn run_group(
     let Found { mut of_balls, left, .. } =
         run(cloud, &balls, Neighborhood::Ball(largest), queries, options, monitor)?;
     if !left.is_empty() {
-        // The largest ball alone; the smaller ones may yet be walked together.
-        let some = queries.some(&left);
-        let directions = options.directions_of(&left);
-        let options = ExtractOptions { directions: directions.as_deref(), ..options.clone() };
-        let ball = Neighborhood::Ball(largest);
-        let mut dense = run(cloud, &Balls::one(largest), ball, &some.queries(), &options, monitor)?.of_balls;
-        dense.extend(run_group(cloud, &radii[1..], &some.queries(), &options, monitor)?);
+        let alone = |radius: Radius, queries: &Queries<'_>, options: &ExtractOptions<'_>| {
+            let found =
+                run(cloud, &Balls::one(radius), Neighborhood::Ball(radius), queries, options, monitor)?;
+            Ok(found.of_balls.into_iter().next().expect("one ball was asked for"))
+        };
+        // Where most queries are left, all are asked for: that costs less than an index of some.
+        let most = 2 * left.len() > of_balls[0].len();
+        let dense: Vec<Extraction> = if most {
+            let done = of_balls[0].status.iter().filter(|&&status| status != Status::NotFinite).count();
+            monitor.take_back(radii.len() * done);
+            radii.iter().map(|&radius| alone(radius, queries, options)).collect::<Result<_, Error>>()?
+        } else {
+            // The largest ball alone; the smaller ones may yet be walked together.
+            let some = queries.some(&left);
+            let directions = options.directions_of(&left);
+            let options = ExtractOptions { directions: directions.as_deref(), ..options.clone() };
+            let first = alone(largest, &some.queries(), &options)?;
+            let smaller = run_group(cloud, &radii[1..], &some.queries(), &options, monitor)?;
+            std::iter::once(first).chain(smaller).collect()
+        };
+        let entries =
+            left.iter().enumerate().map(|(place, &query)| (query, if most { query } else { place }));
         for (all, dense) in of_balls.iter_mut().zip(&dense) {
-            all.take_over(left.iter().copied().zip(0..), dense);
+            all.take_over(entries.clone(), dense);
         }
     }
     Ok(of_balls)

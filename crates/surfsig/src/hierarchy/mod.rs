@@ -17,6 +17,3 @@ pub(crate) use forest::CELLS_PER_REGION;
 /// Points in a cell of the lattice from which on the balls around its points are walked by the hierarchy. On a
 /// surface a ball then holds some 600: there both walks take the same time.
 pub(crate) const DENSE: usize = 48;
-
-/// The same where several balls around each point are walked at once: the hierarchy walks one at a time.
-pub(crate) const DENSE_FOR_SEVERAL: usize = 2 * DENSE;
