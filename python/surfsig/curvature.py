@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, SupportsFloat
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -106,7 +106,7 @@ def extract(
         if axes == "sensor":
             raise InvalidInputError("radius='auto' chooses by standard errors, which axes='sensor' has not")
     job = _Job(axes, fit, at, voxel, viewpoint, normals, robust, threads, progress)
-    size = positive_length(radius, "radius") if isinstance(radius, SupportsFloat) else radius
+    size = radius if radius is None or isinstance(radius, str) else positive_length(radius, "radius")
     most = None if neighbors is None else whole_number(neighbors, "neighbors", MOST_NEIGHBORS)
     return job.run(PointCloud.of(cloud), size, most)[0]
 
