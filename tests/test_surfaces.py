@@ -236,3 +236,16 @@ def test_the_errors_of_the_core_are_given_on() -> None:
     assert math.isnan(without.radius_std)
     assert without.covariance.shape == (4, 4)
     assert np.isnan(without.covariance).all()
+
+
+def test_kinds_are_tried_the_simplest_first_in_whatever_order_they_are_asked_for() -> None:
+    points = surface_scenes.box().points
+    one, other = (surfsig.surfaces(points, kinds=kinds) for kinds in (["torus", "plane"], ["plane", "torus"]))
+    assert {surface.kind for surface in one} == {"plane"}
+    np.testing.assert_array_equal(one.labels, other.labels)
+
+
+def test_no_surface_has_fewer_points_than_asked_for() -> None:
+    found = surfsig.surfaces(surface_scenes.box().points, min_points=200)
+    assert all(surface.count >= 200 for surface in found)
+    assert (np.bincount(found.labels[found.labels >= 0]) >= 200).all()

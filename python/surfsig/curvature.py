@@ -50,9 +50,10 @@ def extract(
         Radius of the ball around each place, in the cloud's own unit; half the side D of the paper's
         patch. Finite and above 0. May be left out where `neighbors` is given. "auto": for each place the
         largest of the radii 2^(i/2), i a whole number, that the fit still explains: from the smallest ball
-        with 16 points on, as long as the next larger one has curvatures that do not differ significantly,
-        points that are no farther from the surface, and a smaller standard error. `Extraction.radius` says
-        which; only points near to a place count. In the surface's axes only.
+        with 16 points on, as long as no points farther from the surface come, the one whose mean curvature
+        errs least, by its standard error and by a bias that shows against the next smaller ball; a step
+        less where a larger one was rejected. `Extraction.radius` says which; only points near to a place
+        count. In the surface's axes only.
     neighbors
         That many nearest points, the place itself included where it is a point of the cloud; together
         with `radius` at most that many of the points within it (a hybrid search).

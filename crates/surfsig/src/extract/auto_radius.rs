@@ -3,7 +3,7 @@
 use super::explained::Shown;
 use super::neighborhood::distances_to_nearest;
 use super::radii::run_group;
-use super::{ExtractOptions, Extraction, Monitor, Queries, Status, check};
+use super::{ExtractOptions, Extraction, Monitor, Queries, Status, check, with_some};
 use crate::threads::with_threads;
 use crate::{Error, PointCloud, Radius};
 
@@ -65,7 +65,8 @@ pub fn extract_auto_radius(
         let (distances, largest) = distances_to_nearest(cloud, FEWEST as usize, monitor)?;
         let nearest = distances.iter().copied().find(|&d| d > 0.0).unwrap_or(1.0);
         let step = 2.0 * nearest.max(1e-9 * largest.max(1e-6)).log2();
-        // Passes are counted from a radius of one unit. Where the first begins costs time, and changes nothing.
+        // Passes are counted from a radius of one unit, so that where the first begins costs time, and changes nothing
+        // but how far the last one reaches.
         let first = (step / f64::from(STEPS - 1)).floor() as i32;
         let mut climb = Climb { cloud, queries, options, monitor, lowest: first - PASSES_BELOW, found: None };
         climb.from(first, (0..queries.len(cloud)).collect())?;
@@ -134,10 +135,9 @@ impl Climb<'_> {
         let mut balls = if chosen.len() == self.queries.len(self.cloud) {
             run_group(self.cloud, &largest_first, self.queries, self.options, &monitor)?
         } else {
-            let some = self.queries.some(chosen);
-            let directions = self.options.directions_of(chosen);
-            let options = ExtractOptions { directions: directions.as_deref(), ..self.options.clone() };
-            run_group(self.cloud, &largest_first, &some.queries(), &options, &monitor)?
+            with_some(self.queries, self.options, chosen, |queries, options| {
+                run_group(self.cloud, &largest_first, queries, options, &monitor)
+            })?
         };
         balls.reverse();
         Ok(balls)

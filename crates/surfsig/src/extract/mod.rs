@@ -62,13 +62,6 @@ pub struct ExtractOptions<'a> {
     pub instruction_set: Option<InstructionSet>,
 }
 
-impl ExtractOptions<'_> {
-    /// The directions of some of the queries.
-    fn directions_of(&self, chosen: &[usize]) -> Option<Vec<[f32; 3]>> {
-        self.directions.map(|all| chosen.iter().map(|&i| all[i]).collect())
-    }
-}
-
 /// Curvature at every point of a cloud, from the points within a radius or another [`Neighborhood`].
 ///
 /// # Errors
@@ -133,8 +126,9 @@ pub(crate) fn extract_within(
 ) -> Result<Extraction, Error> {
     match neighborhood {
         Neighborhood::Ball(radius) | Neighborhood::Hybrid { radius, .. } => {
-            let found = run(cloud, &Balls::one(radius), neighborhood, queries, options, monitor)?;
-            Ok(found.of_balls.into_iter().next().expect("one ball was asked for"))
+            Ok(run(cloud, &Balls::one(radius), neighborhood, queries, options, monitor)?
+                .of_balls
+                .swap_remove(0))
         }
         Neighborhood::Nearest(k) => run_nearest(cloud, k, queries, options, monitor),
     }
@@ -170,11 +164,12 @@ fn run_nearest(
         // The count of what is done starts again for those that need more.
         monitor.take_back(left.len());
         radius = Radius::new(2.0 * radius.get())?;
-        let Found { of_balls, index, .. } =
-            run_some(cloud, &Balls::one(radius), nearest, queries, &left, options, monitor)?;
+        let more = with_some(queries, options, &left, |queries, options| {
+            run(cloud, &Balls::one(radius), nearest, queries, options, monitor)
+        })?;
         found.radius = radius.get();
-        found.take_over(left.iter().copied().zip(0..), &of_balls[0]);
-        let still = unresolved(&of_balls[0], k, &index);
+        found.take_over(left.iter().copied().zip(0..), &more.of_balls[0]);
+        let still = unresolved(&more.of_balls[0], k, &more.index);
         left = still.into_iter().map(|i| left[i]).collect();
     }
     Ok(found)
@@ -187,20 +182,17 @@ fn unresolved(found: &Extraction, k: usize, index: &CellIndex) -> Vec<usize> {
     (0..found.len()).filter(short).collect()
 }
 
-/// As [`run`], for some of the queries.
-fn run_some(
-    cloud: &PointCloud<'_>,
-    balls: &Balls<'_>,
-    neighborhood: Neighborhood,
+/// Does something with some of the queries, and with the options that belong to them.
+fn with_some<T>(
     queries: &Queries<'_>,
-    chosen: &[usize],
     options: &ExtractOptions<'_>,
-    monitor: &Monitor,
-) -> Result<Found, Error> {
+    chosen: &[usize],
+    job: impl FnOnce(&Queries<'_>, &ExtractOptions<'_>) -> T,
+) -> T {
     let some = queries.some(chosen);
-    let directions = options.directions_of(chosen);
-    let options = ExtractOptions { directions: directions.as_deref(), ..options.clone() };
-    run(cloud, balls, neighborhood, &some.queries(), &options, monitor)
+    let directions: Option<Vec<[f32; 3]>> =
+        options.directions.map(|all| chosen.iter().map(|&i| all[i]).collect());
+    job(&some.queries(), &ExtractOptions { directions: directions.as_deref(), ..options.clone() })
 }
 
 /// Some balls around each query.

@@ -1,6 +1,8 @@
 //! Balls of several radii around every query, in one pass over the points.
 
-use super::{Balls, ExtractOptions, Extraction, Found, Monitor, Neighborhood, Queries, Status, check, run};
+use super::{
+    Balls, ExtractOptions, Extraction, Found, Monitor, Neighborhood, Queries, Status, check, run, with_some,
+};
 use crate::threads::with_threads;
 use crate::{Error, PointCloud, Radius};
 
@@ -13,7 +15,8 @@ const SMALLEST: f64 = 1.0 / 8.0;
 /// The points of the largest ball are looked at once, and each is summed once, in the shell between two radii.
 /// Only where a ball holds many hundreds of points each radius has a pass of its own, by the hierarchy. A value
 /// differs from that of [`extract`](super::extract()) with this radius alone by no more than rounding does:
-/// |dk| <= 1e-5 max(|k|, 1/r), and a point whose distance is the radius within rounding may count in one of them only.
+/// |dk| <= 1e-5 max(|k|, 1/r), and a point whose distance is the radius within rounding may count in one of them
+/// only.
 ///
 /// The monitor counts each query once for each radius.
 ///
@@ -68,10 +71,13 @@ pub(super) fn run_group(
     options: &ExtractOptions<'_>,
     monitor: &Monitor,
 ) -> Result<Vec<Extraction>, Error> {
-    if options.robust && radii.len() > 1 {
+    let alone = |radius: Radius, queries: &Queries<'_>, options: &ExtractOptions<'_>| {
+        let found = run(cloud, &Balls::one(radius), Neighborhood::Ball(radius), queries, options, monitor);
+        Ok(found?.of_balls.swap_remove(0))
+    };
+    if options.robust {
         // What is an outlier is another matter for each ball.
-        let each = radii.iter().map(|&radius| run_group(cloud, &[radius], queries, options, monitor));
-        return each.map(|found| Ok(found?.swap_remove(0))).collect();
+        return radii.iter().map(|&radius| alone(radius, queries, options)).collect();
     }
     let Some(&largest) = radii.first() else { return Ok(Vec::new()) };
     let relative: Vec<f64> = radii.iter().map(|radius| radius.get() / largest.get()).collect();
@@ -79,11 +85,6 @@ pub(super) fn run_group(
     let Found { mut of_balls, left, .. } =
         run(cloud, &balls, Neighborhood::Ball(largest), queries, options, monitor)?;
     if !left.is_empty() {
-        let alone = |radius: Radius, queries: &Queries<'_>, options: &ExtractOptions<'_>| {
-            let found =
-                run(cloud, &Balls::one(radius), Neighborhood::Ball(radius), queries, options, monitor)?;
-            Ok(found.of_balls.into_iter().next().expect("one ball was asked for"))
-        };
         // Where most queries are left, all are asked for: that costs less than an index of some.
         let most = 2 * left.len() > of_balls[0].len();
         let dense: Vec<Extraction> = if most {
@@ -92,12 +93,11 @@ pub(super) fn run_group(
             radii.iter().map(|&radius| alone(radius, queries, options)).collect::<Result<_, Error>>()?
         } else {
             // The largest ball alone; the smaller ones may yet be walked together.
-            let some = queries.some(&left);
-            let directions = options.directions_of(&left);
-            let options = ExtractOptions { directions: directions.as_deref(), ..options.clone() };
-            let first = alone(largest, &some.queries(), &options)?;
-            let smaller = run_group(cloud, &radii[1..], &some.queries(), &options, monitor)?;
-            std::iter::once(first).chain(smaller).collect()
+            with_some(queries, options, &left, |queries, options| {
+                let first = alone(largest, queries, options)?;
+                let smaller = run_group(cloud, &radii[1..], queries, options, monitor)?;
+                Ok(std::iter::once(first).chain(smaller).collect())
+            })?
         };
         let entries =
             left.iter().enumerate().map(|(place, &query)| (query, if most { query } else { place }));

@@ -28,9 +28,6 @@ const MOST_SEEDS: usize = 100_000;
 /// neighbours in a scan may err together.
 const LEVELS: [usize; 3] = [LOCAL, 4 * LOCAL, 16 * LOCAL];
 
-/// Failures in which a point takes part until it is no seed any more.
-const TRIES: u8 = 1;
-
 /// How surfaces are found.
 ///
 /// ```
@@ -121,11 +118,14 @@ pub fn find_surfaces(
             return Ok(FoundSurfaces { labels: vec![NONE; cloud.len()], surfaces: Vec::new() });
         };
         let fewest = options.fewest.unwrap_or_else(|| (scene.points.len() / 500).clamp(20, 1000));
-        let all = SurfaceKind::ALL;
-        let kinds = if options.kinds.is_empty() { &all[..] } else { &options.kinds };
-        let mut regions = regions(&mut scene, kinds, fewest, monitor)?;
+        // The simplest first, in whatever order they were asked for.
+        let wanted = |kind: &SurfaceKind| options.kinds.is_empty() || options.kinds.contains(kind);
+        let kinds: Vec<SurfaceKind> = SurfaceKind::ALL.into_iter().filter(wanted).collect();
+        let mut regions = regions(&mut scene, &kinds, fewest, monitor)?;
         settling::merge(&mut scene, &mut regions);
         settling::assign(&mut scene, &mut regions);
+        // Some may have lost their points to a nearer one.
+        regions.retain(|region| region.members.len() >= fewest);
         Ok(assembled(cloud.len(), &scene, regions))
     })?
 }
@@ -147,9 +147,10 @@ fn regions(
         let left = (0..count as u32).filter(|&point| scene.labels[point as usize] == NONE);
         let mut seeds: Vec<u32> = left.step_by(count.div_ceil(MOST_SEEDS)).collect();
         seeds.sort_by(|&a, &b| scene.noise[a as usize].total_cmp(&scene.noise[b as usize]));
-        let mut tried = vec![0_u8; count];
+        // A point that took part in a failure is no seed any more.
+        let mut tried = vec![false; count];
         for seed in seeds {
-            if scene.labels[seed as usize] != NONE || tried[seed as usize] >= TRIES {
+            if scene.labels[seed as usize] != NONE || tried[seed as usize] {
                 continue;
             }
             monitor.check()?;
@@ -163,7 +164,7 @@ fn regions(
                     }
                     regions.push(region);
                 }
-                Err(members) => members.into_iter().for_each(|point| tried[point as usize] += 1),
+                Err(members) => members.into_iter().for_each(|point| tried[point as usize] = true),
             }
         }
     }

@@ -133,8 +133,8 @@ impl Scene {
         found
     }
 
-    /// Those of some points that are near to a surface and lie along it (a cosine), and the unlabelled points that hang together with them there:
-    /// at most so many.
+    /// Those of some points that are near to a surface and lie along it (a cosine), and the unlabelled points that hang
+    /// together with them there: at most so many.
     pub fn reached(
         &self,
         chart: &Chart,
