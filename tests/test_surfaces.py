@@ -240,7 +240,8 @@ def test_the_errors_of_the_core_are_given_on() -> None:
 
 def test_kinds_are_tried_the_simplest_first_in_whatever_order_they_are_asked_for() -> None:
     points = surface_scenes.box().points
-    one, other = (surfsig.surfaces(points, kinds=kinds) for kinds in (["torus", "plane"], ["plane", "torus"]))
+    one = surfsig.surfaces(points, kinds=["torus", "plane"])
+    other = surfsig.surfaces(points, kinds=["plane", "torus"])
     assert {surface.kind for surface in one} == {"plane"}
     np.testing.assert_array_equal(one.labels, other.labels)
 

@@ -81,11 +81,10 @@ def surfaces(
 def _kinds(kinds: Sequence[Kind] | None) -> list[str]:
     if kinds is None:
         return list(KINDS)
-    chosen = [kinds] if isinstance(kinds, str) else list(kinds)
+    chosen: list[str] = [kinds] if isinstance(kinds, str) else list(kinds)
     wrong = next((kind for kind in chosen if kind not in KINDS), None)
     if wrong is not None:
         raise InvalidInputError(f"kinds must be of {', '.join(KINDS)}, not {wrong!r:.40}")
     if not chosen:
         raise InvalidInputError(f"kinds must be some of {', '.join(KINDS)}")
-    # The core tries them in its own order, the simplest first.
-    return [kind for kind in KINDS if kind in chosen]
+    return chosen
