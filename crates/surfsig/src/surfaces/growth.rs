@@ -45,9 +45,6 @@ const THICKEST: f64 = 0.035;
 const LOOKED_AT: usize = 100;
 const LINE: f64 = 0.01;
 
-/// Noise of so many floors is none.
-const NOISELESS: f64 = 20.0;
-
 /// Rounds after the growth has ended.
 const MAX_SETTLING: usize = 6;
 
@@ -74,10 +71,6 @@ const ALONG: f64 = 0.9;
 const EVIDENCE: f64 = 10.0;
 
 impl Scene {
-    fn is_noiseless(&self, noise: f64) -> bool {
-        noise <= NOISELESS * self.floor
-    }
-
     fn patience(&self, noise: f64) -> Patience {
         if self.is_noiseless(noise) { EXACT } else { QUICK }
     }
@@ -101,13 +94,22 @@ pub(super) struct Grower<'a> {
     pub fewest: usize,
     /// Points around a seed from which a surface begins.
     pub first: usize,
+    /// Points at which a surface is large enough.
+    pub enough: usize,
     pub seen: &'a mut Stamps,
     pub inside: &'a mut Stamps,
 }
 
 impl Grower<'_> {
-    /// The surface that grows from a seed or the points that were tried.
+    /// The surface that grows from a seed, or the points that were tried.
     pub fn region_around(&mut self, seed: u32) -> Result<Region, Vec<u32>> {
+        let region = self.largest_around(seed)?;
+        let found = region.is_smooth(self.scene) && region.members.len() >= self.fewest;
+        if found { Ok(region) } else { Err(region.members) }
+    }
+
+    /// The surface that grows from a seed, smooth or not.
+    pub fn largest_around(&mut self, seed: u32) -> Result<Region, Vec<u32>> {
         let first = self.scene.around(seed, self.first, self.seen);
         let noise = self.scene.noise_around(seed, self.seen);
         let mut best: Option<Region> = None;
@@ -132,11 +134,7 @@ impl Grower<'_> {
             });
             best = better.or(best);
         }
-        match best {
-            Some(region) if region.is_smooth(self.scene) && region.members.len() >= self.fewest => Ok(region),
-            Some(region) => Err(region.members),
-            None => Err(first),
-        }
+        best.ok_or(first)
     }
 
     /// The simplest surface that explains a seed's first points as well as any.
@@ -160,6 +158,7 @@ impl Grower<'_> {
 
     /// A surface of a kind with more parameters near some points, if it explains them much better than a simpler one.
     fn more_complex(&self, kind: SurfaceKind, simpler: &Region, points: &[u32]) -> Option<Primitive> {
+        let all = points.len() as f64;
         let (points, normals) = self.scene.sample(points, SAMPLE_OF_KIND);
         let patience = self.scene.patience(simpler.noise);
         let (primitive, deviation) = fitted(kind, &points, &normals, &[simpler.primitive], patience)?;
@@ -167,7 +166,8 @@ impl Grower<'_> {
         let squares: f64 = points.iter().map(|point| chart.distance(point).powi(2)).sum();
         let before = (squares / points.len() as f64).sqrt();
         let more = kind.parameters() - simpler.primitive.kind.parameters();
-        let gain = points.len() as f64 * (before.max(1e-300) / deviation.max(1e-300)).ln();
+        let gain = (points.len() as f64).min(all / self.scene.likeness.alike)
+            * (before.max(1e-300) / deviation.max(1e-300)).ln();
         (gain > EVIDENCE * more as f64).then_some(primitive)
     }
 
@@ -192,7 +192,10 @@ impl Grower<'_> {
                 return None;
             }
             settled += usize::from(after < most);
-            if settled >= MAX_SETTLING || after < most && after.abs_diff(before) <= after / 300 {
+            if after >= self.enough
+                || settled >= MAX_SETTLING
+                || after < most && after.abs_diff(before) <= after / 300
+            {
                 break;
             }
         }

@@ -7,6 +7,7 @@
 mod graph;
 mod growth;
 mod least_squares;
+mod likeness;
 mod primitive;
 mod scene;
 mod settling;
@@ -144,9 +145,17 @@ fn regions(
         if level > LOCAL {
             scene.look_farther(level, monitor)?;
         }
-        let left = (0..count as u32).filter(|&point| scene.labels[point as usize] == NONE);
-        let mut seeds: Vec<u32> = left.step_by(count.div_ceil(MOST_SEEDS)).collect();
+        let left = scene.chosen.iter().copied().filter(|&point| scene.labels[point as usize] == NONE);
+        let mut seeds: Vec<u32> = left.step_by(scene.chosen.len().div_ceil(MOST_SEEDS)).collect();
         seeds.sort_by(|&a, &b| scene.noise[a as usize].total_cmp(&scene.noise[b as usize]));
+        if level == LOCAL && scene.is_unknown() {
+            likeness::learn(scene, &seeds, |scene, seed, enough| {
+                let (seen, inside) = (&mut seen, &mut inside);
+                Grower { scene, kinds, fewest: enough / 40, first: level, enough, seen, inside }
+                    .largest_around(seed)
+                    .ok()
+            });
+        }
         // A point that took part in a failure is no seed any more.
         let mut tried = vec![false; count];
         for seed in seeds {
@@ -154,8 +163,15 @@ fn regions(
                 continue;
             }
             monitor.check()?;
-            let mut grower =
-                Grower { scene, kinds, fewest, first: level, seen: &mut seen, inside: &mut inside };
+            let mut grower = Grower {
+                scene,
+                kinds,
+                fewest,
+                first: level,
+                enough: usize::MAX,
+                seen: &mut seen,
+                inside: &mut inside,
+            };
             match grower.region_around(seed) {
                 Ok(region) => {
                     monitor.add(region.members.len());
