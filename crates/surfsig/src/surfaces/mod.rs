@@ -1,25 +1,17 @@
 //! Which parts of a scan are planes, spheres, cylinders, cones and tori.
 //!
-//! [`scene`] knows each point's neighbours, normal and noise; [`start`] reads a surface off points and normals,
-//! [`least_squares`] fits it by orthogonal distance, [`growth`] lets it grow, [`settling`] joins what is one and shares
-//! out what lies between.
+//! [`scene`] knows each point's neighbours, normal and noise; [`growth`] lets a [`crate::Primitive`] grow, [`settling`]
+//! joins what is one and shares out what lies between.
 
 mod graph;
 mod growth;
-mod least_squares;
-mod primitive;
 mod scene;
 mod settling;
-mod start;
-mod uncertainty;
 
-pub use primitive::SurfaceKind;
-
+use crate::primitive::{SurfaceKind, Vector, uncertainty};
 use crate::{Error, Monitor, PointCloud, with_threads};
 use growth::{Grower, Region};
-use primitive::Vector;
 use scene::{LOCAL, NONE, Scene, Stamps};
-use uncertainty::uncertainty;
 
 /// Seeds of which surfaces begin; of larger clouds not every point is one.
 const MOST_SEEDS: usize = 100_000;

@@ -1,9 +1,9 @@
 //! The points among which surfaces grow, and what is known about each.
 
 use super::graph::{Graph, NEIGHBOURS};
-use super::primitive::{Chart, Vector};
 use crate::extract::extract_within;
 use crate::fit::{FitKind, FitUsed};
+use crate::primitive::{Chart, Vector};
 use crate::{Error, ExtractOptions, Extraction, Monitor, Neighborhood, PointCloud, Queries, Radius};
 
 /// Nearest points to which a surface is fitted for a point's normal and noise.
