@@ -65,5 +65,5 @@ pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
 pub use simd::InstructionSet;
 pub use similarity::{GOOD, OPTIMAL, SimilarityClass, similarity};
-pub use surfaces::{FoundSurface, FoundSurfaces, SurfaceOptions, find_surfaces};
+pub use surfaces::{FEWEST_SURFACE_POINTS, FoundSurface, FoundSurfaces, SurfaceOptions, find_surfaces};
 pub use threads::with_threads;

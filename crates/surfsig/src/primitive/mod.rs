@@ -49,6 +49,9 @@ pub fn fit_primitive(points: &[[f64; 3]], kind: SurfaceKind, start: Option<&Prim
     let mean = points.iter().map(|&p| Vector::from(p)).sum::<Vector>() / points.len() as f64;
     let local: Vec<Vector> = points.iter().map(|&p| Vector::from(p) - mean).collect();
     let extent = extent(&local);
+    if !(extent > 0.0 && extent.is_finite()) {
+        return None;
+    }
     let starts = match start {
         Some(start) if start.kind == kind => vec![start.shifted(&-mean)],
         Some(_) => return None,
@@ -70,7 +73,7 @@ mod tests {
     fn revolved(count: u32, profile: impl Fn(f64) -> (f64, f64)) -> Vec<[f64; 3]> {
         let [axis, first, second] = [[0.6, 0.0, 0.8], [0.8, 0.0, -0.6], [0.0, 1.0, 0.0]].map(Vector::from);
         let place = |i: u32| {
-            let (away, height) = profile((0.618_034 * f64::from(i)).fract());
+            let (away, height) = profile((0.414_214 * f64::from(i)).fract());
             let (sine, cosine) = (2.399_963 * f64::from(i)).sin_cos();
             Vector::new(5.0, 6.0, 7.0) + height * axis + away * (cosine * first + sine * second)
         };

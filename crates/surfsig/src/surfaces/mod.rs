@@ -13,6 +13,9 @@ use crate::{Error, Monitor, PointCloud, with_threads};
 use growth::{Grower, Region};
 use scene::{LOCAL, NONE, Scene, Stamps};
 
+/// Fewer points are no surface, unless somebody says so.
+pub const FEWEST_SURFACE_POINTS: usize = 20;
+
 /// Seeds of which surfaces begin; of larger clouds not every point is one.
 const MOST_SEEDS: usize = 100_000;
 
@@ -109,7 +112,8 @@ pub fn find_surfaces(
         let Some(mut scene) = Scene::new(cloud, options.noise, monitor)? else {
             return Ok(FoundSurfaces { labels: vec![NONE; cloud.len()], surfaces: Vec::new() });
         };
-        let fewest = options.fewest.unwrap_or_else(|| (scene.points.len() / 500).clamp(20, 1000));
+        let fewest =
+            options.fewest.unwrap_or_else(|| (scene.points.len() / 500).clamp(FEWEST_SURFACE_POINTS, 1000));
         // The simplest first, in whatever order they were asked for.
         let wanted = |kind: &SurfaceKind| options.kinds.is_empty() || options.kinds.contains(kind);
         let kinds: Vec<SurfaceKind> = SurfaceKind::ALL.into_iter().filter(wanted).collect();
