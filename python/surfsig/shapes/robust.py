@@ -35,18 +35,20 @@ def settled(
     come back until the choice stands.
     """
     surface = _surfsig.fit_primitive(points, kind)
+    if surface is None:
+        return None
     inliers = np.ones(len(points), np.bool_)
     rounding = rounding_of(points)
     for _ in range(MAX_PASSES if robust else 0):
-        if surface is None:
-            break
         distances = surface.distances(points)
         chosen = near(distances, distances, rounding)
         if np.array_equal(chosen, inliers):
             break
         inliers = chosen
         surface = _surfsig.fit_primitive(points[inliers], kind, surface)
-    return None if surface is None else (surface, inliers)
+        if surface is None:
+            return None
+    return surface, inliers
 
 
 def rounding_of(points: Array) -> float:
