@@ -7,23 +7,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "FEWEST_SURFACE_POINTS",
     "GOOD",
     "INSTRUCTION_SET",
+    "KIND_PARAMETERS",
     "OPTIMAL",
     "STATUS_NAMES",
     "E57Reader",
     "Frame",
+    "Primitive",
     "__version__",
     "extract",
     "find_surfaces",
-    "fit_cylinder",
-    "fit_sphere",
+    "fit_primitive",
     "voxel_representatives",
     "write_e57",
 ]
 
 __version__: str
 STATUS_NAMES: list[str]
+KIND_PARAMETERS: dict[str, int]
+FEWEST_SURFACE_POINTS: int
 INSTRUCTION_SET: str
 OPTIMAL: float
 GOOD: float
@@ -53,8 +57,9 @@ def find_surfaces(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> tuple[NDArray[np.int32], list[dict[str, Any]]]: ...
-def fit_sphere(points: NDArray[np.float64]) -> tuple[list[float], float] | None: ...
-def fit_cylinder(points: NDArray[np.float64]) -> tuple[list[float], list[float], float] | None: ...
+def fit_primitive(
+    points: NDArray[np.float64], kind: str, start: Primitive | None = None
+) -> Primitive | None: ...
 def voxel_representatives(
     points: NDArray[np.floating], *, origin: Sequence[float], voxel: float
 ) -> NDArray[np.uint32]: ...
@@ -107,3 +112,17 @@ class Frame:
     def signatures_of_surfaces(
         self, surfaces: NDArray[np.float32], *, side: float
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]: ...
+
+@final
+class Primitive:
+    @property
+    def point(self) -> NDArray[np.float64]: ...
+    @property
+    def axis(self) -> NDArray[np.float64]: ...
+    @property
+    def radius(self) -> float: ...
+    def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def uncertainty(
+        self, points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]: ...
+    def independent_error(self, points: NDArray[np.float64]) -> float: ...

@@ -3,8 +3,8 @@
 mod e57;
 mod extract;
 mod frame;
+mod primitive;
 mod python_file;
-mod shapes;
 mod surfaces;
 
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
@@ -56,16 +56,20 @@ mod _surfsig {
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]
-    use crate::shapes::{fit_cylinder, fit_sphere};
+    use crate::primitive::{Primitive, fit_primitive};
     #[pymodule_export]
     use crate::surfaces::find_surfaces;
 
     use pyo3::prelude::*;
+    use pyo3::types::IntoPyDict;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("STATUS_NAMES", surfsig::Status::ALL.map(surfsig::Status::name).to_vec())?;
+        let parameters = surfsig::SurfaceKind::ALL.map(|kind| (kind.name(), kind.parameters()));
+        module.add("KIND_PARAMETERS", parameters.into_py_dict(module.py())?)?;
+        module.add("FEWEST_SURFACE_POINTS", surfsig::FEWEST_SURFACE_POINTS)?;
         module.add("INSTRUCTION_SET", surfsig::InstructionSet::detect().name())?;
         module.add("OPTIMAL", surfsig::OPTIMAL)?;
         module.add("GOOD", surfsig::GOOD)

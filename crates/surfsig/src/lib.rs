@@ -27,7 +27,8 @@
 //!
 //! The way of the data, room by room: [`PointCloud`] -> [`CellIndex`] -> [`Moments`] -> paraboloid
 //! ([`FitAxes`]) -> curvature ([`Paraboloid`]) -> [`Frame`] -> [`similarity`]; [`extract()`] walks it.
-//! [`fit_sphere`], [`fit_cylinder`] and [`fit_quadric`] read other surfaces off the same moments.
+//! [`fit_sphere`], [`fit_cylinder`] and [`fit_quadric`] read other surfaces off the same moments, [`fit_primitive`]
+//! fits one by orthogonal distance, and [`find_surfaces`] finds all of a scan.
 
 mod ball;
 mod block_sums;
@@ -41,6 +42,7 @@ mod hierarchy;
 mod members;
 mod moments;
 mod point_cloud;
+mod primitive;
 mod shells;
 mod simd;
 mod similarity;
@@ -60,7 +62,8 @@ pub use fit::{
 pub use frame::{Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use point_cloud::{Offsets, PointCloud, Radius};
+pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
 pub use simd::InstructionSet;
 pub use similarity::{GOOD, OPTIMAL, SimilarityClass, similarity};
-pub use surfaces::{FoundSurface, FoundSurfaces, SurfaceKind, SurfaceOptions, find_surfaces};
+pub use surfaces::{FEWEST_SURFACE_POINTS, FoundSurface, FoundSurfaces, SurfaceOptions, find_surfaces};
 pub use threads::with_threads;

@@ -1,9 +1,7 @@
 //! A surface that grows over its neighbours.
 
-use super::least_squares::{EXACT, Patience, QUICK, refine};
-use super::primitive::{Primitive, SurfaceKind, Vector};
 use super::scene::{Scene, Stamps};
-use super::start::{bent, start};
+use crate::primitive::{EXACT, Patience, Primitive, QUICK, SurfaceKind, Vector, bent, extent, refine, start};
 use nalgebra::Matrix3;
 
 /// Points that every surface has.
@@ -289,11 +287,4 @@ impl Region {
     pub fn is_smooth(&self, scene: &Scene) -> bool {
         self.deviation <= ROUGH * self.noise + scene.floor
     }
-}
-
-/// How far points are spread: the diagonal of their box.
-pub(super) fn extent(points: &[Vector]) -> f64 {
-    let far = Vector::repeat(f64::INFINITY);
-    let (low, high) = points.iter().fold((far, -far), |(low, high), p| (low.inf(p), high.sup(p)));
-    (high - low).norm()
 }

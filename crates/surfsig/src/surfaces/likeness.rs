@@ -3,9 +3,9 @@
 //! The nearest points of a place show only what errors differ by among themselves. What they have in common (steps of
 //! a sensor's depth, a lens, smoothing in the camera) bends a surface instead, and would make two of one.
 
-use super::growth::{Region, extent};
+use super::growth::Region;
 use super::scene::{Scene, middle};
-use rustc_hash::FxHashMap;
+use crate::primitive::{Vector, design_effect};
 
 /// Surfaces that are grown on trial, from seeds spread evenly over those whose noise is from a tenth to six tenths.
 const TRIALS: usize = 48;
@@ -20,7 +20,7 @@ const ENOUGH: usize = 2000;
 const LEAST: usize = 60;
 
 /// Points in a block of neighbours.
-const BLOCK: f64 = 32.0;
+const BLOCK: usize = 50;
 
 /// Fewest points that err as one from which they count as alike at all.
 const ALIKE: f64 = 2.0;
@@ -74,21 +74,10 @@ pub(super) fn learn(
     }
 }
 
-/// How much more the sums over blocks of neighbours vary than those of points would that err each for itself.
+/// How many points of a surface count as one.
 fn points_as_one(scene: &Scene, region: &Region) -> f64 {
-    let points: Vec<_> = region.members.iter().map(|&member| scene.points[member as usize]).collect();
-    let size = extent(&points) * (BLOCK / points.len() as f64).sqrt();
+    let points: Vec<Vector> = region.members.iter().map(|&member| scene.points[member as usize]).collect();
     let chart = region.primitive.chart();
-    let mut blocks: FxHashMap<[i64; 3], f64> = FxHashMap::default();
-    let mut squares = 0.0;
-    for point in &points {
-        let distance = chart.distance(point);
-        squares += distance * distance;
-        *blocks.entry([point.x, point.y, point.z].map(|c| (c / size).floor() as i64)).or_default() +=
-            distance;
-    }
-    let mut sums: Vec<f64> = blocks.into_values().map(|sum| sum * sum).collect();
-    // In an order of their own, so that their sum is the same each time.
-    sums.sort_unstable_by(f64::total_cmp);
-    sums.iter().sum::<f64>() / squares.max(f64::MIN_POSITIVE)
+    let residuals: Vec<f64> = points.iter().map(|point| chart.distance(point)).collect();
+    design_effect(&points, &residuals, points.len().div_ceil(BLOCK))
 }

@@ -1,26 +1,21 @@
 //! Which parts of a scan are planes, spheres, cylinders, cones and tori.
 //!
-//! [`scene`] knows each point's neighbours, normal and noise; [`start`] reads a surface off points and normals,
-//! [`least_squares`] fits it by orthogonal distance, [`growth`] lets it grow, [`settling`] joins what is one and shares
-//! out what lies between.
+//! [`scene`] knows each point's neighbours, normal and noise; [`growth`] lets a [`crate::Primitive`] grow, [`settling`]
+//! joins what is one and shares out what lies between.
 
 mod graph;
 mod growth;
-mod least_squares;
 mod likeness;
-mod primitive;
 mod scene;
 mod settling;
-mod start;
-mod uncertainty;
 
-pub use primitive::SurfaceKind;
-
+use crate::primitive::{SurfaceKind, Vector, uncertainty};
 use crate::{Error, Monitor, PointCloud, with_threads};
 use growth::{Grower, Region};
-use primitive::Vector;
 use scene::{LOCAL, NONE, Scene, Stamps};
-use uncertainty::uncertainty;
+
+/// Fewer points are no surface, unless somebody says so.
+pub const FEWEST_SURFACE_POINTS: usize = 20;
 
 /// Seeds of which surfaces begin; of larger clouds not every point is one.
 const MOST_SEEDS: usize = 100_000;
@@ -118,7 +113,8 @@ pub fn find_surfaces(
         let Some(mut scene) = Scene::new(cloud, options.noise, monitor)? else {
             return Ok(FoundSurfaces { labels: vec![NONE; cloud.len()], surfaces: Vec::new() });
         };
-        let fewest = options.fewest.unwrap_or_else(|| (scene.points.len() / 500).clamp(20, 1000));
+        let fewest =
+            options.fewest.unwrap_or_else(|| (scene.points.len() / 500).clamp(FEWEST_SURFACE_POINTS, 1000));
         // The simplest first, in whatever order they were asked for.
         let wanted = |kind: &SurfaceKind| options.kinds.is_empty() || options.kinds.contains(kind);
         let kinds: Vec<SurfaceKind> = SurfaceKind::ALL.into_iter().filter(wanted).collect();

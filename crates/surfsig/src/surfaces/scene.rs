@@ -2,9 +2,9 @@
 
 use super::graph::{Graph, NEIGHBOURS};
 use super::likeness::Likeness;
-use super::primitive::{Chart, Vector};
 use crate::extract::extract_within;
 use crate::fit::{FitKind, FitUsed};
+use crate::primitive::{Chart, Vector};
 use crate::{
     Error, ExtractOptions, Extraction, Monitor, Neighborhood, PointCloud, Queries, Radius,
     voxel_representatives,
