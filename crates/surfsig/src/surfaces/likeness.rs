@@ -41,15 +41,16 @@ impl Likeness {
     pub const NONE: Self = Self { spread: 1.0, alike: 1.0 };
 }
 
-/// Looks how far surfaces stray that may stray as far as the last ones did, until that does not grow any more.
+/// Looks how far surfaces stray that may stray as far as the last ones did, until that does not grow any more. Says
+/// whether there was anything to learn from.
 pub(super) fn learn(
     scene: &mut Scene,
     seeds: &[u32],
     mut grower: impl FnMut(&Scene, u32, usize) -> Option<Region>,
-) {
+) -> bool {
     let (first, last) = ((SMOOTHEST * seeds.len() as f64) as usize, (ROUGHEST * seeds.len() as f64) as usize);
     let step = ((last - first) / TRIALS).max(1);
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
         let mut strays = Vec::new();
         let mut alike = Vec::new();
         for &seed in seeds[first..last].iter().step_by(step) {
@@ -60,18 +61,19 @@ pub(super) fn learn(
             }
         }
         if strays.len() < FEWEST {
-            return;
+            return round > 0;
         }
         let (stray, alike) = (middle(strays).unwrap_or(1.0), middle(alike).unwrap_or(1.0));
         if alike < ALIKE {
-            return;
+            return true;
         }
         scene.likeness.alike = alike;
         if stray < SETTLED {
-            return;
+            return true;
         }
         scene.likeness.spread *= stray;
     }
+    true
 }
 
 /// How many points of a surface count as one.

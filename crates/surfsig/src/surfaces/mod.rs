@@ -137,6 +137,7 @@ fn regions(
     let count = scene.points.len();
     let (mut seen, mut inside) = (Stamps::new(count), Stamps::new(count));
     let mut regions = Vec::new();
+    let mut unknown = scene.is_unknown();
     for level in LEVELS {
         if level > LOCAL {
             scene.look_farther(level, monitor)?;
@@ -144,8 +145,8 @@ fn regions(
         let left = scene.chosen.iter().copied().filter(|&point| scene.labels[point as usize] == NONE);
         let mut seeds: Vec<u32> = left.step_by(scene.chosen.len().div_ceil(MOST_SEEDS)).collect();
         seeds.sort_by(|&a, &b| scene.noise[a as usize].total_cmp(&scene.noise[b as usize]));
-        if level == LOCAL && scene.is_unknown() {
-            likeness::learn(scene, &seeds, |scene, seed, enough| {
+        if unknown {
+            unknown = !likeness::learn(scene, &seeds, |scene, seed, enough| {
                 let (seen, inside) = (&mut seen, &mut inside);
                 Grower { scene, kinds, fewest: enough / 40, first: level, enough, seen, inside }
                     .largest_around(seed)
