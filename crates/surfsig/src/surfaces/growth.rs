@@ -248,6 +248,14 @@ impl Region {
         Some(())
     }
 
+    /// The same points as a surface of another kind, if it is smooth.
+    pub fn of_kind(&self, kind: SurfaceKind, scene: &Scene) -> Option<Self> {
+        let (points, normals) = scene.sample(&self.members, SAMPLE);
+        let mut region = Self { primitive: start(kind, &points, &normals)?, ..self.clone() };
+        region.fit(scene, usize::MAX)?;
+        region.is_smooth(scene).then_some(region)
+    }
+
     /// Distance from the surface up to which points belong to it.
     pub fn tolerance(&self, scene: &Scene) -> f64 {
         NEAR * self.deviation.max(0.3 * self.noise).min(ROUGHEST * self.noise) + scene.floor

@@ -24,6 +24,9 @@ const MOST_SEEDS: usize = 100_000;
 /// neighbours in a scan may err together.
 const LEVELS: [usize; 3] = [LOCAL, 4 * LOCAL, 16 * LOCAL];
 
+/// Standard errors by which a size must differ from what a simpler kind has in its place.
+const SIGNIFICANT: f64 = 2.0;
+
 /// How surfaces are found.
 ///
 /// ```
@@ -123,7 +126,7 @@ pub fn find_surfaces(
         settling::assign(&mut scene, &mut regions);
         // Some may have lost their points to a nearer one.
         regions.retain(|region| region.members.len() >= fewest);
-        Ok(assembled(cloud.len(), &scene, regions))
+        Ok(assembled(cloud.len(), &scene, &kinds, regions))
     })?
 }
 
@@ -185,7 +188,7 @@ fn regions(
 }
 
 /// What was found, the largest first.
-fn assembled(points: usize, scene: &Scene, mut regions: Vec<Region>) -> FoundSurfaces {
+fn assembled(points: usize, scene: &Scene, kinds: &[SurfaceKind], mut regions: Vec<Region>) -> FoundSurfaces {
     regions.sort_by_key(|region| std::cmp::Reverse(region.members.len()));
     let mut labels = vec![NONE; points];
     let surfaces = regions.iter_mut().enumerate().map(|(number, region)| {
@@ -194,10 +197,27 @@ fn assembled(points: usize, scene: &Scene, mut regions: Vec<Region>) -> FoundSur
         }
         // A fit that fails keeps the last one.
         let _ = region.fit(scene, usize::MAX);
-        described(region, scene)
+        let mut found = described(region, scene);
+        while let Some(simpler) = insignificant(&found).filter(|simpler| kinds.contains(simpler)) {
+            let Some(as_smooth) = region.of_kind(simpler, scene) else { break };
+            *region = as_smooth;
+            found = described(region, scene);
+        }
+        found
     });
     let surfaces = surfaces.collect();
     FoundSurfaces { labels, surfaces }
+}
+
+/// The simpler kind that a surface is not significantly different from: a sphere or cylinder whose radius is uncertain by
+/// half of itself may as well be a plane, and a cone that hardly opens a cylinder.
+fn insignificant(found: &FoundSurface) -> Option<SurfaceKind> {
+    let (size, error, simpler) = match found.kind {
+        SurfaceKind::Sphere | SurfaceKind::Cylinder => (found.radius, found.radius_std, SurfaceKind::Plane),
+        SurfaceKind::Cone => (found.half_angle, found.half_angle_std, SurfaceKind::Cylinder),
+        SurfaceKind::Plane | SurfaceKind::Torus => return None,
+    };
+    (size < SIGNIFICANT * error).then_some(simpler)
 }
 
 /// A region's surface with its errors.
