@@ -54,7 +54,6 @@ def check(found: Surfaces, owner: NDArray[np.intp], share: float, precision: flo
 
 def test_neighbours_err_alike() -> None:
     """As a stereo camera's do: what they have in common is four times what they differ by."""
-    print(f"seed {SEED}")
     rng = np.random.default_rng(SEED)
     rays, depth, owner = camera()
     common = gaussian_filter(rng.normal(size=depth.shape), 4)
@@ -67,7 +66,6 @@ def test_neighbours_err_alike() -> None:
 @pytest.mark.parametrize(("step", "jitter"), [(0.003, 0.3), (0.001, 0.0)])
 def test_a_sensor_that_measures_in_steps(step: float, jitter: float) -> None:
     """As the first Kinect's depths do, in steps of 3 mm at one metre: no step is a surface."""
-    print(f"seed {SEED}")
     rng = np.random.default_rng(SEED)
     rays, depth, owner = camera()
     stepped = 1 / (np.round(1 / depth / step + jitter * rng.normal(size=depth.shape)) * step)
@@ -78,7 +76,6 @@ def test_a_sensor_that_measures_in_steps(step: float, jitter: float) -> None:
 
 def test_points_that_were_seen_many_times() -> None:
     """As a tablet's features are: short clumps along the line of sight."""
-    print(f"seed {SEED}")
     rng = np.random.default_rng(SEED)
     rays, depth, owner = camera()
     seen = rng.permutation(depth.size)[:6000]
@@ -91,8 +88,7 @@ def test_points_that_were_seen_many_times() -> None:
 
 
 def test_errors_that_are_independent_stay_so() -> None:
-    """Nothing is made coarser where neighbours do not err alike: a step of five standard deviations is seen."""
-    print(f"seed {SEED}")
+    """Nothing is made coarser where neighbours do not err alike: a step of five deviations is seen."""
     rng = np.random.default_rng(SEED)
     x, y = rng.uniform(0, 1, (2, 20_000))
     upper = x > 0.5

@@ -21,7 +21,7 @@ def found_in(path: Path, kind: str, near: float) -> Surface:
 
 
 def test_the_mug(shared_data: Path) -> None:
-    """PCL's documentation fits 0.0396 to it; towards its foot the camera rounds it off, and it has a handle."""
+    """PCL fits 0.0396 to it; towards its foot the camera rounds it off, and it has a handle."""
     mug = found_in(shared_data / "surfaces" / "table_scene_mug.pcd", "cylinder", 0.039)
     assert mug.radius == pytest.approx(0.0396, abs=0.0025)
     assert abs(mug.axis @ (0, 0.834, 0.552)) > 0.99
