@@ -58,7 +58,9 @@ def test_tables_are_not_mixed_nor_in_pieces(shared_data: Path) -> None:
     scenes = read_tables(shared_data)
     found = [surfsig.surfaces(scene.cloud) for scene in scenes]
     total = TableScore.total(
-        score_table(scene, Found(each.labels, [s.kind for s in each], [s.radius for s in each]))
+        score_table(
+            scene, Found(each.labels.astype(np.int64), [s.kind for s in each], [s.radius for s in each])
+        )
         for scene, each in zip(scenes, found, strict=True)
     )
     assert total.unmixed / total.labelled > 0.97

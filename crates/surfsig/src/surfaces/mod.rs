@@ -145,7 +145,8 @@ fn regions(
         if level > LOCAL {
             scene.look_farther(level, monitor)?;
         }
-        let left = scene.chosen.iter().copied().filter(|&point| scene.labels[point as usize] == NONE);
+        let seed = |point: usize| scene.labels[point] == NONE && scene.noise[point].is_finite();
+        let left = scene.chosen.iter().copied().filter(|&point| seed(point as usize));
         let mut seeds: Vec<u32> = left.step_by(scene.chosen.len().div_ceil(MOST_SEEDS)).collect();
         seeds.sort_by(|&a, &b| scene.noise[a as usize].total_cmp(&scene.noise[b as usize]));
         if unknown {

@@ -37,6 +37,12 @@ const STEP: f64 = 0.1;
 /// ... and so many times as many points are looked at.
 const FARTHER: usize = 4;
 
+/// Points that look farther are not many more than this, ...
+const FARTHER_AT: usize = 20_000;
+
+/// ... but at least one in as many times as they look at so many points.
+const IN_COMMON: usize = 48;
+
 /// Noise of so many floors is none.
 const NOISELESS: f64 = 20.0;
 
@@ -112,9 +118,15 @@ impl Scene {
         Ok(Some(scene))
     }
 
-    /// Looks at so many nearest points of each that has no label.
+    /// Looks at so many nearest points of those that have no label: of every so manieth, for neighbours have most of them
+    /// in common. The others' noise is not known any more.
     pub fn look_farther(&mut self, neighbours: usize, monitor: &Monitor) -> Result<(), Error> {
-        self.look_around(|scene, point| scene.labels[point] == NONE, neighbours, monitor)
+        let left: Vec<u32> =
+            self.chosen.iter().copied().filter(|&point| self.labels[point as usize] == NONE).collect();
+        left.iter().for_each(|&point| self.noise[point as usize] = f64::INFINITY);
+        let step = left.len().div_ceil(FARTHER_AT).clamp(1, (neighbours / IN_COMMON).max(1));
+        let some: Vec<u32> = left.into_iter().step_by(step).collect();
+        self.look_around(&some, neighbours, monitor)
     }
 
     /// Looks at more points around those that lie on a surface much smoother than what is usual: they are on one step
@@ -123,24 +135,22 @@ impl Scene {
         let known = self.noise.iter().copied().filter(|noise| noise.is_finite()).collect();
         match middle(known) {
             Some(usual) if !self.is_noiseless(usual) => {
-                self.look_around(|scene, point| scene.noise[point] < STEP * usual, FARTHER * LOCAL, monitor)
+                let smooth = |&point: &u32| self.noise[point as usize] < STEP * usual;
+                let smooth: Vec<u32> = self.chosen.iter().copied().filter(smooth).collect();
+                self.look_around(&smooth, FARTHER * LOCAL, monitor)
             }
             _ => Ok(()),
         }
     }
 
-    fn look_around(
-        &mut self,
-        wanted: impl Fn(&Self, usize) -> bool,
-        neighbours: usize,
-        monitor: &Monitor,
-    ) -> Result<(), Error> {
+    /// Of some of the chosen points, ascending.
+    fn look_around(&mut self, some: &[u32], neighbours: usize, monitor: &Monitor) -> Result<(), Error> {
         let places: Vec<[f64; 3]> = self.chosen.iter().map(|&i| self.points[i as usize].into()).collect();
-        let (queries, points): (Vec<u32>, Vec<u32>) =
-            (0..).zip(self.chosen.iter().copied()).filter(|&(_, point)| wanted(self, point as usize)).unzip();
+        let rank = |point: &u32| self.chosen.partition_point(|chosen| chosen < point) as u32;
+        let queries: Vec<u32> = some.iter().map(rank).collect();
         let queries = Queries::Indices(&queries);
         let local = around(&PointCloud::new_f64(&places), neighbours, &queries, &monitor.apart())?;
-        self.learn(&local, &points);
+        self.learn(&local, some);
         Ok(())
     }
 
@@ -243,11 +253,12 @@ impl Scene {
         largest
     }
 
-    /// Points and normals of some points, evenly thinned to at most so many; those without a normal are left out.
+    /// Points and normals of some points, evenly thinned to at most so many; those are left out whose noise and normal are not
+    /// known.
     pub fn sample(&self, points: &[u32], most: usize) -> (Vec<Vector>, Vec<Vector>) {
         let step = points.len().div_ceil(most).max(1);
-        let with_normal = |point: &&u32| self.normals[**point as usize].x.is_finite();
-        let chosen = points.iter().step_by(step).filter(with_normal).map(|&point| point as usize);
+        let known = |point: &&u32| self.noise[**point as usize].is_finite();
+        let chosen = points.iter().step_by(step).filter(known).map(|&point| point as usize);
         chosen.map(|point| (self.points[point], self.normals[point])).unzip()
     }
 
