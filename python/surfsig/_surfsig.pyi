@@ -11,8 +11,10 @@ __all__ = [
     "INSTRUCTION_SET",
     "OPTIMAL",
     "STATUS_NAMES",
+    "DepthImage",
     "E57Reader",
     "Frame",
+    "SurfacePlaces",
     "__version__",
     "extract",
     "find_surfaces",
@@ -67,6 +69,29 @@ def write_e57(
     records: Sequence[tuple[str, str, int, int]],
     scans: Iterable[tuple[str, Sequence[float] | None, Iterable[Sequence[NDArray[Any]]]]],
 ) -> None: ...
+
+@final
+class SurfacePlaces:
+    def __new__(cls, places: NDArray[np.float32], normals: NDArray[np.float32]) -> SurfacePlaces: ...
+
+@final
+class DepthImage:
+    def __new__(
+        cls,
+        points: SurfacePlaces,
+        own: NDArray[np.bool_],
+        *,
+        eye: Sequence[float],
+        spacing: float,
+        reach: float,
+        second: Sequence[float] | None = None,
+    ) -> DepthImage: ...
+    def judge(
+        self, poses: NDArray[np.float64], places: SurfacePlaces, most: int, tolerance: float
+    ) -> NDArray[np.float32]: ...
+    def correspondences(
+        self, pose: NDArray[np.float64], places: SurfacePlaces, most: int, tolerance: float
+    ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]: ...
 
 @final
 class E57Reader:

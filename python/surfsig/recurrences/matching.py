@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from surfsig.recurrences.alignment import Alignment, align, refined
+from surfsig.recurrences.alignment import Alignment, align, inverse, refined
 from surfsig.recurrences.view import View
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ def pose_between(pairs: Pairs, source: int, target: int) -> Array:
     """Give the pose T_target_source of a pair in either order."""
     if (source, target) in pairs:
         return pairs[source, target].pose
-    return np.asarray(np.linalg.inv(pairs[target, source].pose))
+    return inverse(pairs[target, source].pose)
 
 
 def scores_of(pairs: Pairs, count: int) -> Array:

@@ -25,7 +25,6 @@ from surfsig.recurrences.grouping import groups_of, ways_from_first
 from surfsig.recurrences.matching import Pairs, matched_pairs, pose_between, scores_of
 from surfsig.recurrences.pieces import pieces_of, point_spacing
 from surfsig.recurrences.result import Piece, Recurrence, Recurrences
-from surfsig.recurrences.sight import sight_of
 from surfsig.recurrences.view import View, view_of
 from surfsig.surfaces import Surfaces
 
@@ -98,11 +97,14 @@ def recurrences(
             views += scan.views(length)
             described = scan.signatures()
             signatures += [rows for rows, _, _ in described]
-            smooth += [(points, normals) for _, points, normals in described]
+            smooth += [(points + scan.cloud.origin, normals) for _, points, normals in described]
     pairs = matched_pairs(views, signatures, RECURRENCE_SEED, progress)
     scores = scores_of(pairs, len(pieces))
+    middles = [
+        view.middle + scans[piece.scan].cloud.origin for view, piece in zip(views, pieces, strict=False)
+    ]
     groups = [
-        _recurrence(members, pieces, smooth[members[0]], pairs, scores, [scan.cloud.origin for scan in scans])
+        _recurrence(members, smooth[members[0]], pairs, scores, middles)
         for members in groups_of(scores, RECURRENCE_SCORE)
         if len(members) > 1
     ]
@@ -157,8 +159,18 @@ class _Scan:
             rows = row_of[piece]
             good = rows[known[rows]]
             rows = good if len(good) else rows
-            sight = sight_of(rows, self.points, normals, self._eye(piece), self.spacing)
-            views.append(view_of(rows, self.points, normals, sight, self.spacing, length, tolerance))
+            views.append(
+                view_of(
+                    rows,
+                    self.points,
+                    normals,
+                    eye=self._eye(piece),
+                    second=self._second(piece),
+                    spacing=self.spacing,
+                    length=length,
+                    tolerance=tolerance,
+                )
+            )
         return views
 
     def signatures(self) -> list[tuple[Array, Array, Array]]:
@@ -187,6 +199,12 @@ class _Scan:
             result.append((w[finite], places, normals))
         return result
 
+    def _second(self, piece):
+        import os
+        if os.environ.get("SECOND"):
+            return self._eye(piece) + np.array([0, -.4, .186])
+        return None
+
     def _noise(self, around: Extraction) -> float:
         known = [surface.deviation for surface in self.found.surfaces]
         return float(np.median(known)) if known else float(np.nanmedian(around.noise))
@@ -205,27 +223,24 @@ class _Scan:
 
 def _recurrence(
     members: list[int],
-    pieces: Sequence[Piece],
     smooth: tuple[Array, Array],
     pairs: Pairs,
     scores: Array,
-    origins: Sequence[Array],
+    middles: Sequence[Array],
 ) -> Recurrence:
     """Chain the poses of a group from its first member over the best matches.
 
-    `smooth` are places and normals of the first member, from balls in which noise counts little.
+    `smooth` are places and normals of the first member, from balls in which noise counts little; `middles` are
+    where the coordinates of each piece start.
     """
     pose = {members[0]: np.eye(4)}
     score = {members[0]: 1.0}
     for start, end in ways_from_first(members, scores):
         pose[end] = pose_between(pairs, start, end) @ pose[start]
         score[end] = float(scores[start, end])
-    first = origins[pieces[members[0]].scan]
     for member in members:
-        shift = origins[pieces[member].scan] - pose[member][:3, :3] @ first
-        pose[member][:3, 3] += shift
-    places, normals = smooth
-    free = free_directions(places + first, normals)
+        pose[member][:3, 3] += middles[member] - pose[member][:3, :3] @ middles[members[0]]
+    free = free_directions(*smooth)
     return Recurrence(
         members,
         np.stack([pose[member] for member in members]),
