@@ -84,6 +84,7 @@ class DepthImage:
         eye: Sequence[float],
         spacing: float,
         reach: float,
+        floors: SurfacePlaces,
         second: Sequence[float] | None = None,
     ) -> DepthImage: ...
     def judge(

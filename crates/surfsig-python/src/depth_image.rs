@@ -34,7 +34,8 @@ pub struct DepthImage {
 #[pymethods]
 impl DepthImage {
     #[new]
-    #[pyo3(signature = (points, own, *, eye, spacing, reach, second=None))]
+    #[expect(clippy::too_many_arguments, reason = "keywords of the Python class")]
+    #[pyo3(signature = (points, own, *, eye, spacing, reach, floors, second=None))]
     fn new(
         py: Python<'_>,
         points: &SurfacePlaces,
@@ -42,6 +43,7 @@ impl DepthImage {
         eye: [f64; 3],
         spacing: f64,
         reach: f64,
+        floors: &SurfacePlaces,
         second: Option<[f64; 3]>,
     ) -> PyResult<Self> {
         let own = own.as_slice()?;
@@ -49,7 +51,7 @@ impl DepthImage {
             return Err(invalid_input("expected one flag for each point"));
         }
         let make = || surfsig::DepthImage::new(&points.places, own, eye, spacing, reach, second);
-        Ok(Self { image: py.detach(make) })
+        Ok(Self { image: py.detach(make).standing_on(&floors.places) })
     }
 
     /// Shares (poses, 4) of the first `most` places: confirmed, contradicted, astray, missing.

@@ -10,8 +10,8 @@ const LOST: i32 = 6;
 const ALIKE: f32 = 0.8;
 /// Tolerances from the surface within which another surface would have been told from it.
 const BESIDE: f32 = 4.0;
-/// Cosine to the line of sight from which on a surface is not too steep to be measured (50 degrees).
-const FACING: f32 = 0.64;
+/// Cosine to the line of sight from which on a surface is not too steep to be measured (65 degrees).
+const FACING: f32 = 0.42;
 
 /// A pose as a matrix that turns and shifts, row by row.
 pub type Pose = [[f64; 4]; 4];
@@ -30,7 +30,7 @@ pub struct SurfacePlace {
 pub struct Judgement {
     /// On the piece's own surface, facing alike.
     pub confirmed: f32,
-    /// Where the sensor saw through.
+    /// Where the sensor saw through, or beneath what the piece stands on.
     pub contradicted: f32,
     /// Visible, neither in front nor far behind, but not confirmed: at another angle, or just beneath.
     pub astray: f32,
@@ -89,6 +89,8 @@ pub struct DepthImage {
     side: usize,
     pixels: Vec<Pixel>,
     second: Option<Box<DepthImage>>,
+    /// In the image's axes.
+    floors: Vec<SurfacePlace>,
 }
 
 impl DepthImage {
@@ -119,9 +121,17 @@ impl DepthImage {
             side,
             pixels: Vec::new(),
             second: second.map(|other| Box::new(Self::new(points, own, other, spacing, reach, None))),
+            floors: Vec::new(),
         };
         image.fill(points, own);
         image
+    }
+
+    /// Lets the piece stand on planes, each given by a place and its normal: nothing of it is beneath them.
+    #[must_use]
+    pub fn standing_on(mut self, floors: &[SurfacePlace]) -> Self {
+        self.floors = floors.iter().map(|floor| self.turned(floor)).collect();
+        self
     }
 
     fn fill(&mut self, points: &[SurfacePlace], own: &[bool]) {
@@ -171,6 +181,10 @@ impl DepthImage {
         let mut counts = [0_u32; 4];
         for point in places {
             let place = moved(&turn, &shift, &point.place);
+            if self.floors.iter().any(|floor| height_over(floor, &place) < -2.0 * tolerance) {
+                counts[1] += 1;
+                continue;
+            }
             let Some((cell, depth)) = self.project(&place) else { continue };
             let pixel = &self.pixels[cell];
             match pixel.seen {
@@ -250,11 +264,13 @@ impl DepthImage {
         dot(normal, &towards) > FACING * dot(&towards, &towards).sqrt()
     }
 
-    /// Whether something was measured before a place.
+    /// Whether something was measured before a place; not what a surface beside it would be if it went on there.
     fn hides(&self, place: &[f32; 3], tolerance: f32) -> bool {
         self.project(place).is_some_and(|(cell, depth)| {
             let pixel = &self.pixels[cell];
-            pixel.seen != Seen::Nothing && depth > pixel.at.place[2] + self.distance + 2.0 * tolerance
+            let behind = depth - self.distance - pixel.at.place[2];
+            pixel.seen != Seen::Nothing
+                && behind.min(-height_over(&pixel.at, place)) > 2.0 * tolerance
         })
     }
 

@@ -37,6 +37,10 @@ _SIGNATURES = 100
 """Per piece, at most."""
 _PAIR_UNIT = 0.1
 """Of the pieces' median extent: the distance that counts as much as a radian."""
+_ABOVE = 0.99
+"""Share of a piece's points on one side of what carries it."""
+_NEAR = 2.0
+"""Extents of a piece from its middle within which what carries it has points."""
 _NOISES, _SPACINGS = 3.0, 0.4
 """The tolerance of heights: standard deviations of the noise, or point spacings where that is more."""
 
@@ -120,6 +124,7 @@ class _Scan:
         self.points = self.cloud.offsets[self.numbers].astype(np.float64)
         self.spacing = 0.0
         self.pieces: list[NDArray[np.int64]] = []
+        self.supports: list[tuple[NDArray[np.int64], Array, Array]] = []
         if len(self.numbers) > max(fewest, 2):
             self.spacing = point_spacing(self.points)
             own = found.labels[self.numbers]
@@ -128,7 +133,8 @@ class _Scan:
                 for i, surface in enumerate(found.surfaces)
                 if surface.kind == "plane"
             ]
-            parts, _ = pieces_of(self.points, planes, self.spacing, fewest)
+            parts, supports = pieces_of(self.points, planes, self.spacing, fewest)
+            self.supports = [planes[number][:3] for number in supports]
             self.pieces = [self.numbers[part] for part in parts]
 
     def extents(self) -> list[float]:
@@ -166,6 +172,7 @@ class _Scan:
                     normals,
                     eye=self._eye(piece),
                     second=self._second(piece),
+                    supports=self._beneath(rows, tolerance),
                     spacing=self.spacing,
                     length=length,
                     tolerance=tolerance,
@@ -198,6 +205,20 @@ class _Scan:
             )
             result.append((w[finite], places, normals))
         return result
+
+    def _beneath(self, rows: NDArray[np.int64], tolerance: float) -> list[tuple[Array, Array]]:
+        """Give the supports that a piece is on one side of, as place and normal to that side.
+        """
+        middle = self.points[rows].mean(axis=0)
+        extent = np.linalg.norm(self.points[rows] - middle, axis=1).max()
+        found = []
+        for members, place, normal in self.supports:
+            height = (self.points[rows] - place) @ normal
+            side = 1.0 if np.median(height) > 0.0 else -1.0
+            near = np.linalg.norm(self.points[members] - middle, axis=1).min() <= _NEAR * extent
+            if near and (side * height > -tolerance).mean() >= _ABOVE:
+                found.append((place, side * normal))
+        return found
 
     def _second(self, piece):
         import os

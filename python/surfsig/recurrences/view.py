@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,8 +27,10 @@ class View:
 
     points: Array
     """(n, 3), evenly thinned, in the order of a fixed shuffle: the first ones are spread over all of it."""
+    normals: Array
+    """(n, 3), unit, towards the sensor."""
     surface: SurfacePlaces
-    """The same with their normals."""
+    """Both."""
     pairs: PointPairs
     image: DepthImage
     """What the sensor saw of the piece and around it."""
@@ -46,6 +49,7 @@ def view_of(
     *,
     eye: Array,
     second: Array | None,
+    supports: Sequence[tuple[Array, Array]],
     spacing: float,
     length: float,
     tolerance: float,
@@ -60,6 +64,8 @@ def view_of(
         (n, 3), of the scan.
     eye, second
         Where the sensor stood, and from where else points had to be seen to be measured.
+    supports
+        Planes that carry pieces: a place and the unit normal of each.
     spacing
         Between points.
     length
@@ -77,16 +83,20 @@ def view_of(
     def surface(rows: NDArray[np.int64]) -> SurfacePlaces:
         return SurfacePlaces((points[rows] - middle).astype(np.float32), normals[rows].astype(np.float32))
 
+    floors = np.array(
+        [(place - middle, normal) for place, normal in supports], np.float32
+    ).reshape(-1, 2, 3)
     image = DepthImage(
         surface(around),
         np.isin(around, piece),
         eye=(eye - middle).tolist(),
         spacing=spacing,
         reach=reach,
+        floors=SurfacePlaces(*(np.ascontiguousarray(part) for part in floors.swapaxes(0, 1))),
         second=None if second is None else (second - middle).tolist(),
     )
     pairs = PointPairs.of(points[few] - middle, normals[few], length)
-    return View(points[many] - middle, surface(many), pairs, image, middle, extent, tolerance)
+    return View(points[many] - middle, normals[many], surface(many), pairs, image, middle, extent, tolerance)
 
 
 def _thinned(piece: NDArray[np.int64], points: Array, voxel: float) -> NDArray[np.int64]:
