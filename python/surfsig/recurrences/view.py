@@ -83,9 +83,7 @@ def view_of(
     def surface(rows: NDArray[np.int64]) -> SurfacePlaces:
         return SurfacePlaces((points[rows] - middle).astype(np.float32), normals[rows].astype(np.float32))
 
-    floors = np.array(
-        [(place - middle, normal) for place, normal in supports], np.float32
-    ).reshape(-1, 2, 3)
+    floors = np.array([(place - middle, normal) for place, normal in supports], np.float32).reshape(-1, 2, 3)
     image = DepthImage(
         surface(around),
         np.isin(around, piece),
