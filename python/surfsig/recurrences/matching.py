@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from surfsig.recurrences.alignment import Alignment, align, inverse, refined
+from surfsig.recurrences.alignment import Alignment, align, inverse, measured, refined
+from surfsig.recurrences.grouping import ways_from_first
 from surfsig.recurrences.view import View
 
 Array = NDArray[np.float64]
@@ -22,6 +23,10 @@ _DOUBTFUL = 0.5
 _DETOURS = 3
 _WORTHWHILE = 0.25
 """Scores from which on an alignment is good for a detour."""
+_AGAINST = -0.15
+"""Scores below which a chained pose speaks against a match."""
+_MAJORITY = 0.6
+"""Share of chained poses that must not."""
 
 Pairs = dict[tuple[int, int], Alignment]
 """Alignments of the pairs (source, target), source < target, that match at all."""
@@ -86,6 +91,43 @@ def scores_of(pairs: Pairs, count: int) -> Array:
     for (i, j), found in pairs.items():
         scores[i, j] = scores[j, i] = max(found.score, 0.0)
     return scores
+
+
+def agreement_of(
+    pairs: Pairs, views: Sequence[View]
+) -> Callable[[list[int], list[int], tuple[int, int]], bool]:
+    """Give what tells whether the members of two groups agree with a match between them (see `groups_of`).
+
+    The poses between members are chained over the match. Most of them must not speak against it: a pose
+    that is seen to be wrong is, far more often than not, one between objects that differ.
+    """
+
+    def agree(first: list[int], second: list[int], match: tuple[int, int]) -> bool:
+        i, j = match
+        between = pose_between(pairs, i, j)
+        scores = scores_of(pairs, len(views))
+        onward = poses_from(j, second, pairs, scores)
+        back = poses_from(i, first, pairs, scores)
+        found = [
+            max(
+                measured(onward[b] @ between @ inverse(back[a]), views[a], views[b]).score,
+                scores[a, b],
+            )
+            for a in first
+            for b in second
+        ]
+        return float(np.mean(np.asarray(found) >= _AGAINST)) >= _MAJORITY
+
+    return agree
+
+
+def poses_from(start: int, members: list[int], pairs: Pairs, scores: Array) -> dict[int, Array]:
+    """Chain the poses T_member_start of a group over its best matches."""
+    poses = {start: np.eye(4)}
+    order = [start, *(member for member in members if member != start)]
+    for known, new in ways_from_first(order, scores):
+        poses[new] = pose_between(pairs, known, new) @ poses[known]
+    return poses
 
 
 def _take_detours(pairs: Pairs, views: Sequence[View], seed: int) -> None:

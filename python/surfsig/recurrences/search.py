@@ -18,7 +18,7 @@ from surfsig.errors import InvalidInputError
 from surfsig.recurrences.equal_surfaces import equal_surfaces
 from surfsig.recurrences.free_directions import free_directions
 from surfsig.recurrences.grouping import groups_of, ways_from_first
-from surfsig.recurrences.matching import Pairs, matched_pairs, pose_between, scores_of
+from surfsig.recurrences.matching import Pairs, agreement_of, matched_pairs, poses_from, scores_of
 from surfsig.recurrences.result import Piece, Recurrence, Recurrences
 from surfsig.recurrences.scan import ScanPieces
 from surfsig.recurrences.view import View
@@ -94,7 +94,7 @@ def recurrences(
     ]
     groups = [
         _recurrence(members, smooth[members[0]], pairs, scores, middles)
-        for members in groups_of(scores, RECURRENCE_SCORE)
+        for members in groups_of(scores, RECURRENCE_SCORE, agreement_of(pairs, views))
         if len(members) > 1
     ]
     return Recurrences(groups, pieces, equal_surfaces(scans, RECURRENCE_CONFIDENCE), labels, scores)
@@ -109,14 +109,12 @@ def _recurrence(
 ) -> Recurrence:
     """Chain the poses of a group from its first member over the best matches.
 
-    `smooth` are places and normals of the first member, from balls in which noise counts little; `middles` are
-    where the coordinates of each piece start.
+    `smooth` are places and normals of the first member, from balls in which noise counts little;
+    `middles` are where the coordinates of each piece start.
     """
-    pose = {members[0]: np.eye(4)}
-    score = {members[0]: 1.0}
-    for start, end in ways_from_first(members, scores):
-        pose[end] = pose_between(pairs, start, end) @ pose[start]
-        score[end] = float(scores[start, end])
+    pose = poses_from(members[0], members, pairs, scores)
+    score = {end: float(scores[start, end]) for start, end in ways_from_first(members, scores)}
+    score[members[0]] = 1.0
     for member in members:
         pose[member][:3, 3] += middles[member] - pose[member][:3, :3] @ middles[members[0]]
     free = free_directions(*smooth)

@@ -15,7 +15,7 @@ from surfsig.recurrences.shadows import Region, direction_of_sensor, second_plac
 Array = NDArray[np.float64]
 
 _FAR = 100.0
-"""Of the regions' distances from each other, how far away a sensor is taken to be whose place is not known."""
+"""Of the extent of what was looked at, how far away a sensor is taken to be whose place is not known."""
 
 
 class Standpoint:
@@ -37,7 +37,7 @@ class Standpoint:
             self.place = _guessed(regions, spacing) if known is None else np.asarray(known - cloud.origin)
         eyes = [self.eye(region.piece) for region in regions]
         self.second = second_place(regions, eyes, spacing)
-        """The shift (3,) to where points had to be seen from, too, as from a camera beside a laser; or None."""
+        """The shift (3,) to where points had to be seen from, too, as a camera beside a laser; or None."""
 
     def eye(self, piece: NDArray[np.int64]) -> Array:
         """Give where the piece with these points was seen from: in a sweep, the mean of their viewpoints."""
