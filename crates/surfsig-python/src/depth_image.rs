@@ -1,7 +1,7 @@
 //! Depth images of pieces, for Python.
 
 use crate::{invalid_input, rows};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, ToPyArray};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use numpy::{PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use surfsig::{Judgement, Pose, SurfacePlace};
@@ -81,7 +81,7 @@ impl DepthImage {
         places: &SurfacePlaces,
         most: usize,
         tolerance: f32,
-    ) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>)> {
+    ) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
         let wrong = || invalid_input("expected a C-contiguous array of shape (4, 4)");
         let (pose, _) = rows::<_, 4>(&pose)?.as_chunks::<4>();
         let pose: &Pose = pose.first().ok_or_else(wrong)?;
@@ -90,10 +90,11 @@ impl DepthImage {
         let kept: Vec<(i64, SurfacePlace)> =
             (0..).zip(found).filter_map(|(number, there)| Some((number, there?))).collect();
         let numbers: Vec<i64> = kept.iter().map(|(number, _)| *number).collect();
-        let places: Vec<[f32; 3]> = kept.iter().map(|(_, there)| there.place).collect();
-        let normals: Vec<[f32; 3]> = kept.iter().map(|(_, there)| there.normal).collect();
-        let matrix = |rows: Vec<[f32; 3]>| rows.as_flattened().to_pyarray(py).reshape([rows.len(), 3]);
-        Ok((numbers.into_pyarray(py), matrix(places)?, matrix(normals)?))
+        let matrix = |part: fn(&SurfacePlace) -> [f32; 3]| {
+            let rows: Vec<f64> = kept.iter().flat_map(|(_, there)| part(there)).map(f64::from).collect();
+            rows.into_pyarray(py).reshape([kept.len(), 3])
+        };
+        Ok((numbers.into_pyarray(py), matrix(|there| there.place)?, matrix(|there| there.normal)?))
     }
 }
 

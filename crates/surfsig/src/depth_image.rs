@@ -269,8 +269,7 @@ impl DepthImage {
         self.project(place).is_some_and(|(cell, depth)| {
             let pixel = &self.pixels[cell];
             let behind = depth - self.distance - pixel.at.place[2];
-            pixel.seen != Seen::Nothing
-                && behind.min(-height_over(&pixel.at, place)) > 2.0 * tolerance
+            pixel.seen != Seen::Nothing && behind.min(-height_over(&pixel.at, place)) > 2.0 * tolerance
         })
     }
 
@@ -297,7 +296,10 @@ impl DepthImage {
         let entry = |axis: &[f32; 3], column: usize| {
             (0..3).map(|k| f64::from(axis[k]) * pose[k][column]).sum::<f64>() as f32
         };
-        (self.axes.map(|axis| [0, 1, 2].map(|column| entry(&axis, column))), self.axes.map(|axis| entry(&axis, 3)))
+        (
+            self.axes.map(|axis| [0, 1, 2].map(|column| entry(&axis, column))),
+            self.axes.map(|axis| entry(&axis, 3)),
+        )
     }
 }
 
@@ -321,4 +323,83 @@ fn moved(turn: &[[f32; 3]; 3], shift: &[f32; 3], v: &[f32; 3]) -> [f32; 3] {
 /// The height of a place over the tangent plane of another.
 fn height_over(at: &SurfacePlace, place: &[f32; 3]) -> f32 {
     dot(&at.normal, &[0, 1, 2].map(|i| place[i] - at.place[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UP: [f32; 3] = [0.0, 0.0, 1.0];
+    const FAR_ABOVE: [f64; 3] = [0.0, 0.0, 1e4];
+
+    fn at(x: f32, y: f32, z: f32) -> SurfacePlace {
+        SurfacePlace { place: [x, y, z], normal: UP }
+    }
+
+    fn board(columns: std::ops::Range<i32>, rows: std::ops::Range<i32>, z: f32) -> Vec<SurfacePlace> {
+        let row = |y: i32| columns.clone().map(move |x| at(x as f32, y as f32, z));
+        rows.flat_map(row).collect()
+    }
+
+    fn unmoved() -> Pose {
+        std::array::from_fn(|i| std::array::from_fn(|j| f64::from(i == j)))
+    }
+
+    /// A square of 21 before a wall, with a strip from x = 16 to 22 where nothing was measured.
+    fn image(second: Option<[f64; 3]>) -> DepthImage {
+        let square = board(-10..11, -10..11, 0.0);
+        let mut points = board(-30..31, -30..31, -10.0);
+        points.retain(|point| point.place[0] < 16.0 || point.place[0] > 22.0);
+        let own: Vec<bool> = (0..square.len() + points.len()).map(|number| number < square.len()).collect();
+        DepthImage::new(&[square, points].concat(), &own, FAR_ABOVE, 1.0, 30.0, second)
+    }
+
+    fn judged(image: &DepthImage, point: SurfacePlace) -> [f32; 4] {
+        let found = image.judge(&unmoved(), &[point], 0.3);
+        [found.confirmed, found.contradicted, found.astray, found.missing]
+    }
+
+    #[test]
+    fn what_is_on_hidden_through_and_missing() {
+        let image = image(None);
+        assert_eq!(judged(&image, at(5.0, 5.0, 0.1)), [1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(judged(&image, at(5.0, 5.0, -1.0)), [0.0, 0.0, 1.0, 0.0]);
+        assert_eq!(judged(&image, at(5.0, 5.0, -8.0)), [0.0; 4]);
+        assert_eq!(judged(&image, at(-20.0, 5.0, -2.0)), [0.0, 1.0, 0.0, 0.0]);
+        assert_eq!(judged(&image, at(19.0, 0.0, 0.0)), [0.0, 0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn what_turns_its_back_is_neither_confirmed_nor_missing() {
+        let away = |x| SurfacePlace { place: [x, 5.0, 0.0], normal: [0.0, 0.0, -1.0] };
+        assert_eq!(judged(&image(None), away(5.0)), [0.0, 0.0, 1.0, 0.0]);
+        assert_eq!(judged(&image(None), away(19.0)), [0.0; 4]);
+    }
+
+    #[test]
+    fn nothing_is_missing_where_a_second_place_could_not_see() {
+        // Seen from the left at 45 degrees, the square hides what is 9 behind its plane and 19 to the right.
+        let beside = image(Some([-1e4, 0.0, 1e4]));
+        assert_eq!(judged(&beside, at(19.0, 0.0, -15.0))[3], 0.0);
+        assert_eq!(judged(&beside, at(19.0, 0.0, 0.0))[3], 1.0);
+    }
+
+    #[test]
+    fn nothing_is_beneath_the_floor() {
+        let standing = image(None).standing_on(&[at(0.0, 0.0, -5.0)]);
+        assert_eq!(judged(&standing, at(5.0, 5.0, -8.0)), [0.0, 1.0, 0.0, 0.0]);
+        assert_eq!(judged(&standing, at(5.0, 5.0, -4.0)), [0.0; 4]);
+    }
+
+    #[test]
+    fn correspondences_are_the_points_there_in_the_axes_of_the_scan() {
+        let image = image(None);
+        let mut pose = unmoved();
+        pose[0][3] = 3.0;
+        let found = image.correspondences(&pose, &[at(0.2, 4.1, 0.1), at(12.0, 4.0, 0.1)], 0.3);
+        let near = found[0].expect("on the square");
+        let apart = |a: [f32; 3], b: [f32; 3]| (0..3).map(|i| (a[i] - b[i]).abs()).fold(0.0, f32::max);
+        assert!(apart(near.place, [3.0, 4.0, 0.0]) <= 1.0 && apart(near.normal, UP) < 1e-6);
+        assert_eq!(found[1], None);
+    }
 }

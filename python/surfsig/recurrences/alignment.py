@@ -97,7 +97,7 @@ def _shares(poses: Array, views: tuple[View, View], most: int, looseness: float)
         still.image.judge(moves, moving.surface, most, looseness * still.tolerance)
         for moves, moving, still in ((poses, source, target), (inverse(poses), target, source))
     ]
-    return np.asarray(np.moveaxis(sides, 2, 0), np.float64)
+    return np.moveaxis(np.asarray(sides, np.float64), 2, 0)
 
 
 def inverse(poses: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,7 @@ def matched_pairs(
     views: Sequence[View],
     signatures: Sequence[Array],
     seed: int,
+    threads: int | None,
     progress: Callable[[int, int], object] | None,
 ) -> Pairs:
     """Align all pairs of pieces whose signatures are alike.
@@ -48,19 +50,27 @@ def matched_pairs(
         Of each some signatures, (k, 243).
     seed
         Of the searches.
+    threads
+        How many work; None for one for each core, and some.
     progress
         Called with the pairs done, and of all.
     """
-    pairs: Pairs = {}
-    count = len(views) * (len(views) - 1) // 2
     numbers = [(i, j) for j in range(len(views)) for i in range(j)]
-    for done, (i, j) in enumerate(numbers):
-        if common_share(signatures[i], signatures[j]) >= _ALIKE:
-            found = align(views[i], views[j], np.random.default_rng([seed, i, j]))
+
+    def matched(pair: tuple[int, int]) -> Alignment | None:
+        i, j = pair
+        if common_share(signatures[i], signatures[j]) < _ALIKE:
+            return None
+        return align(views[i], views[j], np.random.default_rng([seed, i, j]))
+
+    pairs: Pairs = {}
+    # Each pair has its own generator: the result does not depend on the number of threads.
+    with ThreadPoolExecutor(threads) as pool:
+        for done, (pair, found) in enumerate(zip(numbers, pool.map(matched, numbers), strict=True)):
             if found is not None:
-                pairs[i, j] = found
-        if progress is not None:
-            progress(done + 1, count)
+                pairs[pair] = found
+            if progress is not None:
+                progress(done + 1, len(numbers))
     _take_detours(pairs, views, seed)
     return pairs
 

@@ -41,14 +41,15 @@ def recurrences(
     Surfaces are grouped by kind and size. Pieces are what hangs together once the planes that carry several
     pieces are taken away. Two pieces match where they have signatures in common, and where there is a pose in
     which each is what the other's sensor saw: on its surface, or hidden, but not where the sensor saw
-    through, nor where it would have seen something. So a half hidden piece matches a whole one. The result is
-    always the same.
+    through, nor where it would have seen something, nor beneath what it stands on. So a half hidden piece
+    matches a whole one. Shadows on the planes tell whether points had to be seen from a second place, as by
+    the camera of a triangulation scanner. The result is always the same.
 
     Parameters
     ----------
     found
-        What `surfsig.surfaces` found in a scan, or in several. Their clouds need a viewpoint (or one per
-        value of the field ``scan``).
+        What `surfsig.surfaces` found in a scan, or in several. Their clouds should have a viewpoint (or one
+        per value of the field ``scan``); without, shadows tell the direction it was in, with a warning.
     min_points
         Fewest points of a piece.
     progress
@@ -63,7 +64,7 @@ def recurrences(
     ------
     InvalidInputError
         If `found` is neither, `min_points` is no whole number, or a cloud with several pieces does not know
-        its viewpoint.
+        its viewpoint, and has no shadows that tell.
     """
     scans = [found] if isinstance(found, Surfaces) else list(found)
     if not all(isinstance(scan, Surfaces) for scan in scans):
@@ -87,7 +88,8 @@ def recurrences(
             described = scan.signatures()
             signatures += [rows for rows, _, _ in described]
             smooth += [(points + scan.cloud.origin, normals) for _, points, normals in described]
-    pairs = matched_pairs(views, signatures, RECURRENCE_SEED, progress)
+    threads = max((scan.threads or 0 for scan in scans), default=0) or None
+    pairs = matched_pairs(views, signatures, RECURRENCE_SEED, threads, progress)
     scores = scores_of(pairs, len(pieces))
     middles = [
         view.middle + scans[piece.scan].cloud.origin for view, piece in zip(views, pieces, strict=False)
