@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from surfsig.recurrences.alignment import Alignment, align, inverse, measured, refined
 from surfsig.recurrences.grouping import ways_from_first
+from surfsig.recurrences.main_surface import may_be_equal
 from surfsig.recurrences.view import View
+from surfsig.surfaces import Surface
 
 Array = NDArray[np.float64]
 
@@ -36,6 +38,7 @@ Pairs = dict[tuple[int, int], Alignment]
 def matched_pairs(
     views: Sequence[View],
     signatures: Sequence[Array],
+    mains: Sequence[Surface | None],
     seed: int,
     threads: int | None,
     progress: Callable[[int, int], object] | None,
@@ -48,6 +51,8 @@ def matched_pairs(
         The pieces.
     signatures
         Of each some signatures, (k, 243).
+    mains
+        Of each the surface that most of it is.
     seed
         Of the searches.
     threads
@@ -59,7 +64,7 @@ def matched_pairs(
 
     def matched(pair: tuple[int, int]) -> Alignment | None:
         i, j = pair
-        if common_share(signatures[i], signatures[j]) < _ALIKE:
+        if not may_be_equal(mains[i], mains[j]) or common_share(signatures[i], signatures[j]) < _ALIKE:
             return None
         return align(views[i], views[j], np.random.default_rng([seed, i, j]))
 
@@ -71,7 +76,7 @@ def matched_pairs(
                 pairs[pair] = found
             if progress is not None:
                 progress(done + 1, len(numbers))
-    _take_detours(pairs, views, seed)
+    _take_detours(pairs, views, mains, seed)
     return pairs
 
 
@@ -140,12 +145,12 @@ def poses_from(start: int, members: list[int], pairs: Pairs, scores: Array) -> d
     return poses
 
 
-def _take_detours(pairs: Pairs, views: Sequence[View], seed: int) -> None:
+def _take_detours(pairs: Pairs, views: Sequence[View], mains: Sequence[Surface | None], seed: int) -> None:
     """Try, for doubtful pairs, the poses by way of third pieces that match both well."""
     scores = scores_of(pairs, len(views))
     for j in range(len(views)):
         for i in range(j):
-            if scores[i, j] >= _DOUBTFUL:
+            if scores[i, j] >= _DOUBTFUL or not may_be_equal(mains[i], mains[j]):
                 continue
             both = np.minimum(scores[i], scores[j])
             via = [k for k in np.argsort(-both, kind="stable")[:_DETOURS] if both[k] >= _WORTHWHILE]

@@ -18,6 +18,7 @@ from surfsig.errors import InvalidInputError
 from surfsig.recurrences.equal_surfaces import equal_surfaces
 from surfsig.recurrences.free_directions import free_directions
 from surfsig.recurrences.grouping import groups_of, ways_from_first
+from surfsig.recurrences.main_surface import main_surface
 from surfsig.recurrences.matching import Pairs, agreement_of, matched_pairs, poses_from, scores_of
 from surfsig.recurrences.result import Piece, Recurrence, Recurrences
 from surfsig.recurrences.scan import ScanPieces
@@ -88,8 +89,9 @@ def recurrences(
             described = scan.signatures()
             signatures += [rows for rows, _, _ in described]
             smooth += [(points + scan.cloud.origin, normals) for _, points, normals in described]
+    mains = [main_surface(piece, scans[piece.scan]) for piece in pieces]
     threads = max((scan.threads or 0 for scan in scans), default=0) or None
-    pairs = matched_pairs(views, signatures, RECURRENCE_SEED, threads, progress)
+    pairs = matched_pairs(views, signatures, mains, RECURRENCE_SEED, threads, progress)
     scores = scores_of(pairs, len(pieces))
     middles = [
         view.middle + scans[piece.scan].cloud.origin for view, piece in zip(views, pieces, strict=False)
