@@ -13,6 +13,7 @@ from surfsig.point_cloud import PointCloud
 from surfsig.recurrences.equal_surfaces import equal_surfaces
 from surfsig.recurrences.free_directions import free_directions, free_directions_of_surface
 from surfsig.recurrences.grouping import groups_of, ways_from_first
+from surfsig.recurrences.main_surface import may_be_equal
 from surfsig.recurrences.matching import common_share
 from surfsig.recurrences.pieces import pieces_of, point_spacing
 from surfsig.recurrences.shadows import Region, direction_of_sensor, places_without_points, second_place
@@ -88,6 +89,26 @@ def test_cones_are_equal_by_their_angle_and_meet_at_their_apex() -> None:
     (group,) = equal_surfaces([scan], 0.99)
     apex = [(r, 2.0, 3.0 - r / np.tan(angle), 1.0) for r, angle in ((0.02, 0.5), (0.01, 0.5001))]
     np.testing.assert_allclose(group.poses[1] @ apex[0], apex[1], atol=1e-12)
+
+
+def test_main_surfaces_that_cannot_be_equal() -> None:
+    can, wide = surface("cylinder", 0.020, 1e-5), surface("cylinder", 0.0205, 1e-5)
+    ball, narrow = surface("sphere", 0.020, 1e-5), surface("sphere", 0.016, 1e-5)
+    frustum, nearly_a_can = (surface("cone", 0.02, 1e-4, half_angle=angle) for angle in (0.3, 0.02))
+    for a, b, equal in (
+        # 2.5 % are what a view of a part may make; 20 % are not.
+        (can, wide, True),
+        (ball, narrow, False),
+        (can, frustum, False),
+        (can, nearly_a_can, True),
+        (frustum, nearly_a_can, False),
+        # An egg may be a sphere on one side.
+        (can, ball, True),
+        (can, None, True),
+    ):
+        assert may_be_equal(a, b) is may_be_equal(b, a) is equal
+    # Errors count where they are large.
+    assert may_be_equal(surface("sphere", 0.020, 1e-3), surface("sphere", 0.016, 1e-3))
 
 
 def directions_of(points: Array, normals: Array) -> list[str]:
