@@ -13,9 +13,11 @@ __all__ = [
     "KIND_PARAMETERS",
     "OPTIMAL",
     "STATUS_NAMES",
+    "DepthImage",
     "E57Reader",
     "Frame",
     "Primitive",
+    "SurfacePlaces",
     "__version__",
     "extract",
     "find_surfaces",
@@ -72,6 +74,30 @@ def write_e57(
     records: Sequence[tuple[str, str, int, int]],
     scans: Iterable[tuple[str, Sequence[float] | None, Iterable[Sequence[NDArray[Any]]]]],
 ) -> None: ...
+
+@final
+class SurfacePlaces:
+    def __new__(cls, places: NDArray[np.float32], normals: NDArray[np.float32]) -> SurfacePlaces: ...
+
+@final
+class DepthImage:
+    def __new__(
+        cls,
+        points: SurfacePlaces,
+        own: NDArray[np.bool_],
+        *,
+        eye: Sequence[float],
+        spacing: float,
+        reach: float,
+        floors: SurfacePlaces,
+        second: Sequence[float] | None = None,
+    ) -> DepthImage: ...
+    def judge(
+        self, poses: NDArray[np.float64], places: SurfacePlaces, most: int, tolerance: float
+    ) -> NDArray[np.float32]: ...
+    def correspondences(
+        self, pose: NDArray[np.float64], places: SurfacePlaces, most: int, tolerance: float
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]: ...
 
 @final
 class E57Reader:

@@ -1,5 +1,6 @@
 //! The bindings: release the interpreter, call the core, map the error; nothing else.
 
+mod depth_image;
 mod e57;
 mod extract;
 mod frame;
@@ -49,6 +50,8 @@ fn rows<'a, T: numpy::Element, const N: usize>(array: &'a PyReadonlyArray2<'_, T
 /// The compiled core of surfsig.
 #[pymodule]
 mod _surfsig {
+    #[pymodule_export]
+    use crate::depth_image::{DepthImage, SurfacePlaces};
     #[pymodule_export]
     use crate::e57::{E57Reader, write_e57};
     #[pymodule_export]

@@ -34,6 +34,7 @@ mod ball;
 mod block_sums;
 mod cell_index;
 mod curvature;
+mod depth_image;
 mod error;
 mod extract;
 mod fit;
@@ -51,6 +52,7 @@ mod threads;
 
 pub use cell_index::CellIndex;
 pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
+pub use depth_image::{DepthImage, Judgement, Pose, SurfacePlace};
 pub use error::Error;
 pub use extract::{
     ExtractOptions, Extraction, Monitor, Neighborhood, Queries, Status, extract, extract_auto_radius,
