@@ -15,6 +15,7 @@ __all__ = [
     "Frame",
     "__version__",
     "extract",
+    "field_signatures",
     "find_surfaces",
     "fit_cylinder",
     "fit_sphere",
@@ -43,6 +44,18 @@ def extract(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> list[dict[str, NDArray[Any]]]: ...
+def field_signatures(
+    points: NDArray[np.floating],
+    *,
+    origin: Sequence[float],
+    radius: float,
+    at: NDArray[np.uint32] | NDArray[np.float64] | None = None,
+    viewpoint: Sequence[float] | None = None,
+    directions: NDArray[np.float32] | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+    pools: bool = False,
+) -> dict[str, NDArray[Any]]: ...
 def find_surfaces(
     points: NDArray[np.floating],
     *,

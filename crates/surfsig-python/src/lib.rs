@@ -2,6 +2,7 @@
 
 mod e57;
 mod extract;
+mod field;
 mod frame;
 mod python_file;
 mod shapes;
@@ -53,6 +54,8 @@ mod _surfsig {
     use crate::e57::{E57Reader, write_e57};
     #[pymodule_export]
     use crate::extract::{extract, voxel_representatives};
+    #[pymodule_export]
+    use crate::field::field_signatures;
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]
