@@ -17,6 +17,7 @@ from surfsig.clean import crop, downsample, remove_outliers
 from surfsig.curvature import extract, extract_radii
 from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
 from surfsig.extraction import Extraction, FitUsed, Status
+from surfsig.field import FieldMatches, FieldSignatures, field_signatures, keypoints, match_fields
 from surfsig.files import read, write
 from surfsig.flat_atom import flat_atom_length
 from surfsig.point_cloud import PointCloud
@@ -28,6 +29,8 @@ from surfsig.surfaces import PointClass, Surface, Surfaces, surfaces
 __all__ = [
     "INSTRUCTION_SET",
     "Extraction",
+    "FieldMatches",
+    "FieldSignatures",
     "FileFormatError",
     "FitUsed",
     "FittedShape",
@@ -46,11 +49,14 @@ __all__ = [
     "downsample",
     "extract",
     "extract_radii",
+    "field_signatures",
     "fit_cylinder",
     "fit_plane",
     "fit_sphere",
     "flat_atom_length",
     "flipped",
+    "keypoints",
+    "match_fields",
     "read",
     "recurrences",
     "remove_outliers",
