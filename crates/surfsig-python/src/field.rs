@@ -5,7 +5,9 @@ use crate::{rows, to_python};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use surfsig::{FIELD_PHASES, FIELD_SIGNATURE, FieldOptions, FieldPatches, Monitor, PointCloud, Queries, Radius};
+use surfsig::{
+    FIELD_PHASES, FIELD_SIGNATURE, FieldOptions, FieldPatches, Monitor, PointCloud, Queries, Radius,
+};
 
 /// Make field signatures; see `surfsig.field_signatures`. With `pools` what the frame sees in place of them.
 #[pyfunction]

@@ -65,7 +65,7 @@ impl FieldFrame {
         set: InstructionSet,
         pool: &Pool,
     ) -> Option<(Box<[f32; FIELD_SIGNATURE]>, Box<FieldPhases>)> {
-        let size = pool.0.iter().flatten().map(|&sum| f64::from(sum).powi(2)).sum::<f64>().sqrt();
+        let size = pool.features().iter().flatten().map(|&sum| f64::from(sum).powi(2)).sum::<f64>().sqrt();
         let mut signature = Box::new([0.0; FIELD_SIGNATURE]);
         let mut phases = Box::new([[[0.0; 2]; FIELD_PHASES]; ORDERS - 1]);
         let mut filled = 0;

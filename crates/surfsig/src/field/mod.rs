@@ -129,7 +129,7 @@ pub fn field_pools(
     options: &FieldOptions<'_>,
     monitor: &Monitor,
 ) -> Result<FieldPatches<Box<[[f32; WAVES]; FEATURES]>>, Error> {
-    let of_pool = |_, pool: &Pool| Some(Box::new(pool.0));
+    let of_pool = |_, pool: &Pool| Some(Box::new(*pool.features()));
     run(cloud, radius, queries, options, monitor, of_pool, || Box::new([[f32::NAN; WAVES]; FEATURES]))
 }
 

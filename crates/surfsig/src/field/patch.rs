@@ -6,7 +6,7 @@ use crate::ball::{BallVisitor, DirectWalk};
 use crate::cell_index::CellIndex;
 use crate::extract::{Extraction, extract_within};
 use crate::simd::InstructionSet;
-use crate::simd::field::{Curved, FEATURES, Pool, WAVES, pool};
+use crate::simd::field::{Curved, Pool, pool};
 use crate::simd::select::Block;
 use crate::{Error, ExtractOptions, Monitor, PointCloud, Queries, Radius, Status};
 use rayon::prelude::*;
@@ -43,7 +43,8 @@ impl Patch<'_> {
     /// The fitted normal, turned to the side of the members' normals near the place.
     fn axis(&self, fitted: [f32; 3]) -> [f32; 3] {
         let square = |[x, y, z]: [f32; 3]| z.mul_add(z, y.mul_add(y, x * x));
-        let near = self.places.iter().zip(&self.members).filter(|(p, _)| square(**p) < AXIS_SHARE * AXIS_SHARE);
+        let near =
+            self.places.iter().zip(&self.members).filter(|(p, _)| square(**p) < AXIS_SHARE * AXIS_SHARE);
         let along = |(_, member): (_, &Curved)| (0..3).map(|a| member.normal[a] * fitted[a]).sum::<f32>();
         if near.map(along).sum::<f32>() < 0.0 { fitted.map(|c| -c) } else { fitted }
     }
@@ -70,12 +71,13 @@ pub(super) fn patches<T: Send>(
     let surface = PointCloud::new_f64(&support.positions);
     let ball = Radius::new(radius.get() * f64::from(AXIS_SHARE))?;
     let queries = Queries::Positions(PointCloud::new_f64(places));
-    let fitted = extract_within(&surface, ball.into(), &queries, &ExtractOptions::default(), &monitor.apart())?;
+    let fitted =
+        extract_within(&surface, ball.into(), &queries, &ExtractOptions::default(), &monitor.apart())?;
     let index = CellIndex::of_positions(surface.len(), |i| surface.position(i), radius, monitor)?;
     let finite = |i: usize| Some(places[i]).filter(|place| place.iter().all(|c| c.is_finite()));
     let asked = CellIndex::of_positions(places.len(), finite, radius, monitor)?;
     let worker = || {
-        let pool = Box::new(Pool([[0.0; WAVES]; FEATURES]));
+        let pool = Box::new(Pool::ZERO);
         let patch =
             Patch { index: &index, curved: &support.curved, places: Vec::new(), members: Vec::new(), pool };
         (DirectWalk::new(&index, set), patch)
@@ -117,7 +119,7 @@ fn entry<T>(
     let count = patch.members.len();
     let axis = patch.axis(fitted.normals[query as usize]);
     let value = (axis[0].is_finite() && count >= FEWEST).then(|| {
-        patch.pool.0.fill([0.0; WAVES]);
+        *patch.pool = Pool::ZERO;
         let x = tangent(axis);
         pool(walk.set, &patch.places, &patch.members, &[x, cross(axis, x), axis], &mut patch.pool);
         of_pool(walk.set, &patch.pool)

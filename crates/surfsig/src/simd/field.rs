@@ -1,6 +1,6 @@
 //! The two kernels of field signatures: members of a ball pooled into harmonics, and harmonics seen in a frame.
 
-use super::for_each_instruction_set;
+use super::{InstructionSet, for_each_instruction_set};
 
 /// Rings of the cylindrical grid, from the axis to the ball's radius.
 pub(crate) const RINGS: usize = 5;
@@ -30,15 +30,61 @@ pub(crate) struct Curved {
 
 /// Sums of waves over the members of a ball, for each bin (ring by ring, in each by height) and quantity.
 #[repr(align(64))]
-pub(crate) struct Pool(pub [[f32; WAVES]; FEATURES]);
+pub(crate) struct Pool(pub [[[f32; WAVES]; QUANTITIES]; RINGS * HEIGHTS]);
+
+impl Pool {
+    pub const ZERO: Self = Self([[[0.0; WAVES]; QUANTITIES]; RINGS * HEIGHTS]);
+
+    /// The waves of each feature.
+    pub fn features(&self) -> &[[f32; WAVES]; FEATURES] {
+        self.0.as_flattened().try_into().expect("as many as there are")
+    }
+}
+
+/// What a member adds to the four bins around it.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Share {
+    waves: [f32; WAVES],
+    factors: [[f32; QUANTITIES]; 4],
+    bins: [u32; 4],
+}
+
+/// Members whose shares are held at a time.
+const HELD: usize = 64;
+
+/// Adds members of a ball to a pool that is zero: their places from its centre in units of its radius, what they
+/// are, and the patch's axes, of which the last is the cylinder's.
+pub(crate) fn pool(
+    set: InstructionSet,
+    places: &[[f32; 3]],
+    members: &[Curved],
+    axes: &[[f32; 3]; 3],
+    pool: &mut Pool,
+) {
+    let none = Share { waves: [0.0; WAVES], factors: [[0.0; QUANTITIES]; 4], bins: [0; 4] };
+    let mut shares = [none; HELD];
+    for (places, members) in places.chunks(HELD).zip(members.chunks(HELD)) {
+        share_out(set, places, members, axes, &mut shares);
+        add(set, &shares[..places.len()], pool);
+    }
+}
 
 for_each_instruction_set! {
-    /// Adds members of a ball to a pool that is zero: their places from its centre in units of its radius, what
-    /// they are, and the patch's axes, of which the last is the cylinder's.
-    pub(crate) fn pool(places: &[[f32; 3]], members: &[Curved], axes: &[[f32; 3]; 3], pool: &mut Pool) {
-        plain: pool_in,
-        wide: pool_in,
-        widest: pool_in,
+    fn share_out(places: &[[f32; 3]], members: &[Curved], axes: &[[f32; 3]; 3], shares: &mut [Share; HELD]) {
+        plain: share_out_in,
+        wide: share_out_in,
+        widest: share_out_in,
+    }
+}
+
+for_each_instruction_set! {
+    /// A function of its own: compiled together with what makes the shares, sums would be taken apart.
+    #[inline(never)]
+    fn add(shares: &[Share], pool: &mut Pool) {
+        plain: add_in,
+        wide: add_in,
+        widest: add_in,
     }
 }
 
@@ -56,20 +102,23 @@ fn shared(value: f32, bins: usize) -> [(usize, f32); 2] {
     [(low, 1.0 - part), ((low + 1).min(bins - 1), part)]
 }
 
+/// The parts of a vector outwards from the axis and around it.
 #[inline(always)]
-fn pool_in(places: &[[f32; 3]], members: &[Curved], axes: &[[f32; 3]; 3], pool: &mut Pool) {
+fn outwards(vector: &[f32; 3], [x, y, _]: &[[f32; 3]; 3], cosine: f32, sine: f32) -> [f32; 2] {
+    let (a, b) = (dot(vector, x), dot(vector, y));
+    [b.mul_add(sine, a * cosine), b.mul_add(cosine, -a * sine)]
+}
+
+#[inline(always)]
+fn share_out_in(places: &[[f32; 3]], members: &[Curved], axes: &[[f32; 3]; 3], shares: &mut [Share; HELD]) {
     let [x, y, z] = axes;
-    for (place, member) in places.iter().zip(members) {
+    for ((place, member), share) in places.iter().zip(members).zip(shares) {
         let (u, v, height) = (dot(place, x), dot(place, y), dot(place, z));
         let distance = v.mul_add(v, u * u).sqrt();
         // On the axis no direction is outwards.
         let (cosine, sine) = if distance > 1e-6 { (u / distance, v / distance) } else { (0.0, 0.0) };
-        let outwards = |vector: &[f32; 3]| {
-            let (a, b) = (dot(vector, x), dot(vector, y));
-            [b.mul_add(sine, a * cosine), b.mul_add(cosine, -a * sine)]
-        };
-        let [out, around] = outwards(&member.normal);
-        let [along, across] = outwards(&member.direction);
+        let [out, around] = outwards(&member.normal, axes, cosine, sine);
+        let [along, across] = outwards(&member.direction, axes, cosine, sine);
         let quantities = [
             dot(&member.normal, z),
             out,
@@ -86,18 +135,43 @@ fn pool_in(places: &[[f32; 3]], members: &[Curved], axes: &[[f32; 3]; 3], pool: 
             waves[order] = s.mul_add(-sine, c * cosine);
             waves[ORDERS + order] = s.mul_add(cosine, c * sine);
         }
-        for (ring, ring_weight) in shared(distance * RINGS as f32, RINGS) {
-            for (level, level_weight) in shared((height + 1.0) * (0.5 * HEIGHTS as f32), HEIGHTS) {
-                let weight = ring_weight * level_weight;
-                let first = (ring * HEIGHTS + level) * QUANTITIES;
-                for (sums, quantity) in pool.0[first..first + QUANTITIES].iter_mut().zip(quantities) {
-                    let factor = weight * quantity;
-                    for (sum, wave) in sums.iter_mut().zip(waves) {
-                        *sum = factor.mul_add(wave, *sum);
-                    }
-                }
+        let rings = shared(distance * RINGS as f32, RINGS);
+        let levels = shared((height + 1.0) * (0.5 * HEIGHTS as f32), HEIGHTS);
+        share.waves = waves;
+        for corner in 0..4 {
+            let ((ring, ring_weight), (level, level_weight)) = (rings[corner / 2], levels[corner % 2]);
+            let weight = ring_weight * level_weight;
+            share.bins[corner] = (ring * HEIGHTS + level) as u32;
+            for q in 0..QUANTITIES {
+                share.factors[corner][q] = weight * quantities[q];
             }
         }
+    }
+}
+
+#[inline(always)]
+fn add_in(shares: &[Share], pool: &mut Pool) {
+    for share in shares {
+        let waves = share.waves;
+        for corner in 0..4 {
+            let factors = &share.factors[corner];
+            // One by one: a loop over them would be made into vectors across, whose numbers are far apart.
+            let [along, out, around, bend, difference, even, odd] = &mut pool.0[share.bins[corner] as usize];
+            add_waves(along, factors[0], &waves);
+            add_waves(out, factors[1], &waves);
+            add_waves(around, factors[2], &waves);
+            add_waves(bend, factors[3], &waves);
+            add_waves(difference, factors[4], &waves);
+            add_waves(even, factors[5], &waves);
+            add_waves(odd, factors[6], &waves);
+        }
+    }
+}
+
+#[inline(always)]
+fn add_waves(sums: &mut [f32; WAVES], factor: f32, waves: &[f32; WAVES]) {
+    for w in 0..WAVES {
+        sums[w] = factor.mul_add(waves[w], sums[w]);
     }
 }
 
@@ -119,8 +193,10 @@ for_each_instruction_set! {
 #[inline(always)]
 fn project_in(pool: &Pool, order: usize, atoms: &AtomBlock) -> [[f32; ATOMS]; 2] {
     let (mut real, mut imaginary) = ([0.0_f32; ATOMS], [0.0_f32; ATOMS]);
-    for (waves, [re, im]) in pool.0.iter().zip(atoms) {
-        let (c, s) = (waves[order], waves[ORDERS + order]);
+    let features = pool.features();
+    for f in 0..FEATURES {
+        let (c, s) = (features[f][order], features[f][ORDERS + order]);
+        let [re, im] = &atoms[f];
         for l in 0..ATOMS {
             real[l] = s.mul_add(-im[l], c.mul_add(re[l], real[l]));
             imaginary[l] = s.mul_add(re[l], c.mul_add(im[l], imaginary[l]));
@@ -131,7 +207,6 @@ fn project_in(pool: &Pool, order: usize, atoms: &AtomBlock) -> [[f32; ATOMS]; 2]
 
 #[cfg(test)]
 mod tests {
-    use super::super::InstructionSet;
     use super::*;
 
     #[test]
@@ -150,7 +225,7 @@ mod tests {
         let pools: Vec<Pool> = InstructionSet::available()
             .into_iter()
             .map(|set| {
-                let mut sums = Pool([[0.0; WAVES]; FEATURES]);
+                let mut sums = Pool::ZERO;
                 pool(set, &places, &members, &axes, &mut sums);
                 sums
             })
@@ -163,10 +238,11 @@ mod tests {
                 .zip(&members)
                 .map(|(p, m)| m.normal[0] * (order as f32 * p[2].atan2(p[1])).cos())
                 .sum();
-            let sum: f32 = pools[0].0.iter().step_by(QUANTITIES).map(|waves| waves[order]).sum();
+            let sum: f32 = pools[0].0.iter().map(|bin| bin[0][order]).sum();
             assert!((sum - expected).abs() < 1e-3, "{order}: {sum} {expected}");
         }
-        let atoms: AtomBlock = std::array::from_fn(|f| [0, 1].map(|k| std::array::from_fn(|l| number(f, k + l))));
+        let atoms: AtomBlock =
+            std::array::from_fn(|f| [0, 1].map(|k| std::array::from_fn(|l| number(f, k + l))));
         let plain = project(InstructionSet::available()[0], &pools[0], 3, &atoms);
         for set in InstructionSet::available() {
             assert_eq!(project(set, &pools[0], 3, &atoms), plain, "{}", set.name());
