@@ -22,6 +22,7 @@ from surfsig.files import read, write
 from surfsig.flat_atom import flat_atom_length
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import Recurrence, Recurrences, recurrences
+from surfsig.registration import Registration, register
 from surfsig.shapes import FittedShape, fit_cylinder, fit_plane, fit_sphere
 from surfsig.similarity import flipped, similarity, similarity_class, similarity_matrix
 from surfsig.surfaces import PointClass, Surface, Surfaces, surfaces
@@ -40,6 +41,7 @@ __all__ = [
     "PointCloud",
     "Recurrence",
     "Recurrences",
+    "Registration",
     "Status",
     "Surface",
     "Surfaces",
@@ -59,6 +61,7 @@ __all__ = [
     "match_fields",
     "read",
     "recurrences",
+    "register",
     "remove_outliers",
     "similarity",
     "similarity_class",

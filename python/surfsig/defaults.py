@@ -64,3 +64,6 @@ KEYPOINTS = 1000
 
 KEYPOINT_CANDIDATES = 4.0
 """Of them, across a patch's radius, from which it chooses."""
+
+REGISTRATION_KEYPOINTS = 1000
+"""Of each scan that is registered."""

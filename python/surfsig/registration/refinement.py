@@ -1,0 +1,62 @@
+"""A pose near the right one, refined by distributions to distributions (GICP, by small_gicp)."""
+
+from __future__ import annotations
+
+import numpy as np
+import small_gicp
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_REACHES = (4.0, 2.0)
+"""Voxels between partners, in the rounds."""
+_NEIGHBOURS = 20
+_MOST_STEPS = 40
+_SETTLED = 1e-5
+"""Radians, and voxels: a step that is none."""
+
+
+class Refiner:
+    """Two clouds, thinned and prepared once.
+
+    Lengths are counted in voxels, which small_gicp's limits suit. One thread: several would add up in an
+    order of their own.
+    """
+
+    def __init__(self, source: Array, target: Array, voxel: float) -> None:
+        self.voxel = voxel
+        self.source, _ = small_gicp.preprocess_points(source / voxel, 1.0, _NEIGHBOURS, 1)
+        self.target, self.tree = small_gicp.preprocess_points(target / voxel, 1.0, _NEIGHBOURS, 1)
+
+    @property
+    def source_places(self) -> Array:
+        """Means of the source's points in each voxel, (n, 3)."""
+        return np.asarray(self.source.points()[:, :3] * self.voxel)
+
+    @property
+    def target_places(self) -> Array:
+        """Means of the target's points in each voxel, (n, 3)."""
+        return np.asarray(self.target.points()[:, :3] * self.voxel)
+
+    def refined(self, pose: Array) -> Array:
+        """Refine T_target_source, (4, 4)."""
+        scaled = pose.copy()
+        scaled[:3, 3] /= self.voxel
+        for reach in _REACHES:
+            found = small_gicp.align(
+                self.target,
+                self.source,
+                self.tree,
+                init_T_target_source=scaled,
+                registration_type="GICP",
+                max_correspondence_distance=reach,
+                num_threads=1,
+                max_iterations=_MOST_STEPS,
+                rotation_epsilon=_SETTLED,
+                translation_epsilon=_SETTLED,
+            )
+            if found.num_inliers == 0:
+                return pose
+            scaled = np.array(found.T_target_source)
+        scaled[:3, 3] *= self.voxel
+        return scaled
