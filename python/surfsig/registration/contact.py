@@ -24,8 +24,16 @@ _STRAY = 3.0
 _FLOOR = 0.02
 """Voxels: a deviation below it is none."""
 _STEPS = 4
-_BLOCKS = 12.0
+_MOST_DRAWN = 4
+"""Points in units of those that are wanted that are looked at."""
+_AROUND = 10
+"""Nearest points that tell the area around one."""
+_BLOCKS = 8.0
 """Blocks along the overlap: what errs alike within one counts once."""
+_FEWEST_BLOCKS = 20
+"""Blocks that tell whether errors are alike."""
+_LARGE = 4.0
+"""Medians of the variance about the surface beyond which it is more than noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +59,30 @@ class _Heights:
     normal: Array
     there: NDArray[np.bool_]
     """Where the target has a surface."""
+    numbers: NDArray[np.int64]
+    """The target's places that tell it, (n, k)."""
+    weights: Array
+    """What each adds to the height, per its own height, (n, k)."""
+    noise: Array
+    """Variance of these about the surface, (n,)."""
+
+
+def spread(points: Array, count: int) -> Array:
+    """Choose so many points, spread evenly over a surface however dense its parts are.
+
+    Each by chance (always the same), with a probability of the area around it. Of voxels, one with its upper
+    part above the surface would give those points only that noise has lifted there.
+    """
+    draws = np.random.default_rng(len(points))
+    if len(points) > _MOST_DRAWN * count:
+        points = points[np.sort(draws.choice(len(points), _MOST_DRAWN * count, replace=False))]
+    if len(points) <= count:
+        return points
+    distances, _ = cKDTree(points).query(points, k=min(_AROUND, len(points)))
+    # A key of u^(1 / weight), the largest ones: Efraimidis and Spirakis, Weighted random sampling (2006).
+    area = np.maximum(distances[:, -1] ** 2, np.finfo(np.float64).tiny)
+    keys = np.log(draws.random(len(points))) / area
+    return np.asarray(points[np.sort(np.argpartition(-keys, count - 1)[:count])])
 
 
 class Surface:
@@ -74,8 +106,9 @@ class Surface:
         x, y, z = (local[..., axis] / scale for axis in range(3))
         design = np.stack([np.ones_like(x), x, y, 0.5 * x * x, x * y, 0.5 * y * y], axis=2)
         normal_matrix = np.einsum("nki,nkj->nij", design, design) + 1e-9 * np.eye(6)
-        right = np.einsum("nki,nk->ni", design, z)
-        fit = np.linalg.solve(normal_matrix, right[..., None])[..., 0]
+        share = np.linalg.solve(normal_matrix, design.transpose(0, 2, 1))
+        fit = np.einsum("nik,nk->ni", share, z)
+        left = z - np.einsum("nki,ni->nk", design, fit)
         slope = fit[:, 1:3]
         steep = 1.0 / np.sqrt(1.0 + (slope**2).sum(axis=1))
         # The place is at 0: the surface is f above it, measured along the normal.
@@ -86,7 +119,9 @@ class Surface:
         )
         near = distances[:, 0] < _REACH * self.voxel
         thin = size[:, 0] < _THICK * size[:, 1]
-        return _Heights(height, tilted * steep[:, None], near & inside & thin)
+        noise = (left**2).sum(axis=1) * (scale[:, 0] * steep) ** 2 / max(count - 6, 1)
+        weights = -share[:, 0] * steep[:, None]
+        return _Heights(height, tilted * steep[:, None], near & inside & thin, numbers, weights, noise)
 
 
 def contact(source: Array, surface: Surface, pose: Array, voxel: float) -> Contact | None:
@@ -122,7 +157,8 @@ def contact(source: Array, surface: Surface, pose: Array, voxel: float) -> Conta
         motion[:3, :3] = Rotation.from_rotvec(change[:3] / unit).as_matrix()
         motion[:3, 3] = center - motion[:3, :3] @ center + change[3:]
         pose = motion @ pose
-    covariance = _covariance(design, heights, places)
+    independent = _independent(design, heights, found, on)
+    covariance = independent * _alike(design, heights, places, independent)
     # The turns were counted in ways of the places.
     scale = np.diag([1.0 / unit] * 3 + [1.0] * 3)
     return Contact(
@@ -136,18 +172,33 @@ def contact(source: Array, surface: Surface, pose: Array, voxel: float) -> Conta
     )
 
 
-def _covariance(design: Array, heights: Array, places: Array) -> Array:
-    """Take what heights have in common within blocks of neighbours as one error (cluster-robust)."""
+def _independent(design: Array, heights: Array, found: _Heights, on: NDArray[np.bool_]) -> Array:
+    """Give the covariance of the motion, (6, 6), if the places of both err independently.
+
+    A place of the target has a part in the heights of many of the source's: its error is in all of them.
+    """
+    weights, numbers = found.weights[on], found.numbers[on]
+    noise = found.noise[on]
+    # Edges make some large.
+    of_target = float(np.minimum(noise, _LARGE * np.median(noise)).mean())
+    of_source = max(float((heights**2).mean()) - of_target * float((weights**2).sum(axis=1).mean()), 0.0)
+    together = np.zeros((int(numbers.max()) + 1, 6))
+    np.add.at(together, numbers.ravel(), (design[:, None] * weights[..., None]).reshape(-1, 6))
     inverse = np.linalg.pinv(design.T @ design, rcond=1e-12, hermitian=True)
-    independent = (heights**2).sum() / max(len(heights) - 6, 1) * inverse
+    middle = of_source * design.T @ design + of_target * together.T @ together
+    return np.asarray(inverse @ middle @ inverse)
+
+
+def _alike(design: Array, heights: Array, places: Array, independent: Array) -> float:
+    """Say how much more the sums over blocks of neighbours vary than independent errors', 1 at least."""
     size = float(np.ptp(places, axis=0).max()) / _BLOCKS
     _, block = np.unique(np.floor(places / size).astype(np.int64), axis=0, return_inverse=True)
     gradients = np.zeros((int(block.max()) + 1, 6))
     np.add.at(gradients, block.ravel(), design * heights[:, None])
     count = len(gradients)
-    if count <= 12:
-        return np.asarray(independent)
+    if count <= _FEWEST_BLOCKS:
+        return 1.0
+    information = design.T @ design
+    inverse = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
     alike = inverse @ (gradients.T @ gradients) @ inverse * count / (count - 6)
-    # Never surer than independent errors would make it.
-    ratio = max(float(np.trace(alike @ design.T @ design) / np.trace(independent @ design.T @ design)), 1.0)
-    return np.asarray(ratio * independent)
+    return max(float(np.trace(alike @ information) / np.trace(independent @ information)), 1.0)

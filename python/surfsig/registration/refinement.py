@@ -29,14 +29,14 @@ class Refiner:
         self.target, self.tree = small_gicp.preprocess_points(target / voxel, 1.0, _NEIGHBOURS, 1)
 
     @property
-    def source_places(self) -> Array:
-        """Means of the source's points in each voxel, (n, 3)."""
-        return np.asarray(self.source.points()[:, :3] * self.voxel)
+    def source_voxels(self) -> int:
+        """Number of voxels with points of the source."""
+        return int(self.source.size())
 
     @property
-    def target_places(self) -> Array:
-        """Means of the target's points in each voxel, (n, 3)."""
-        return np.asarray(self.target.points()[:, :3] * self.voxel)
+    def target_voxels(self) -> int:
+        """Number of voxels with points of the target."""
+        return int(self.target.size())
 
     def refined(self, pose: Array) -> Array:
         """Refine T_target_source, (4, 4)."""

@@ -13,7 +13,7 @@ from surfsig.orientation import orientation
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences.free_directions import free_directions
 from surfsig.registration.consensus import Pairs, agreed_pose
-from surfsig.registration.contact import Contact, Surface, contact
+from surfsig.registration.contact import Contact, Surface, contact, spread
 from surfsig.registration.motion import about_zero, shifted
 from surfsig.registration.refinement import Refiner
 from surfsig.registration.registration import Registration
@@ -99,8 +99,9 @@ def register(
     voxel = size / _VOXELS
     refiner = Refiner(ours.offsets, theirs.offsets, voxel)
     pose = refiner.refined(pose)
-    places = refiner.source_places[:: -(-len(refiner.source_places) // _PLACES)]
-    found = contact(places, Surface(refiner.target_places, voxel), pose, voxel)
+    places = spread(ours.offsets, min(refiner.source_voxels, _PLACES))
+    surface = Surface(spread(theirs.offsets, refiner.target_voxels), voxel)
+    found = contact(places, surface, pose, voxel)
     if found is None:
         return _nothing(size, 0 if pairs is None else len(pairs))
     free = free_directions(found.places + from_theirs, found.normals)
