@@ -67,12 +67,12 @@ pub struct FieldSignature {
 /// ```
 /// use surfsig::{field_signatures, FieldOptions, Monitor, PointCloud, Queries, Radius, Status};
 /// // Two equal bumps on a floor, the second one turned.
-/// let height = |x: f64, y: f64| (-40.0 * (x * x + 3.0 * y * y + x * y)).exp() * 0.3;
+/// let height = |x: f64, y: f64| (-15.0 * (x * x + 3.0 * y * y + x * y)).exp() * 0.15;
 /// let points: Vec<[f64; 3]> = (0..160 * 80)
 ///     .map(|i| (f64::from(i % 160) * 0.025, f64::from(i / 160) * 0.025))
 ///     .map(|(x, y)| [x, y, height(x - 1.0, y - 1.0) + height(y - 1.0, 3.0 - x)])
 ///     .collect();
-/// let places = [[1.0, 1.0, 0.3], [3.0, 1.0, 0.3], [2.0, 1.0, 0.0]];
+/// let places = [[1.0, 1.0, 0.15], [3.0, 1.0, 0.15], [2.0, 1.0, 0.0]];
 /// let options = FieldOptions { viewpoint: Some([2.0, 1.0, 5.0]), ..Default::default() };
 /// let found = field_signatures(
 ///     &PointCloud::new_f64(&points), Radius::new(0.5)?, &Queries::Positions(PointCloud::new_f64(&places)),
