@@ -39,8 +39,8 @@ def keypoints(
     cloud, radius, viewpoint, normals, threads
         As in `field_signatures`.
     count
-        How many, at most; 1,000 by default. Of the most distinctive third of the candidates (or of more, where
-        a third is too few) those stay whose distance to the next one that is more distinctive is largest
+        How many, at most; 1,000 by default. Of the most distinctive third of the candidates (of more where
+        that is too few) those stay whose distance to the next one that is more distinctive is largest
         (adaptive non-maximal suppression), so that they are spread.
     spacing
         In place of `count`: the smallest distance between two of them, in the cloud's own unit. All
