@@ -62,7 +62,7 @@ RECURRENCE_SEED = 0
 KEYPOINTS = 1000
 """Places that `surfsig.keypoints` chooses, where neither number nor distance is asked for."""
 
-KEYPOINT_CANDIDATES = 4.0
+KEYPOINT_CANDIDATES = 8.0
 """Of them, across a patch's radius, from which it chooses."""
 
 REGISTRATION_KEYPOINTS = 1000

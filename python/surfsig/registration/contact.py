@@ -175,15 +175,18 @@ def contact(source: Array, surface: Surface, pose: Array, voxel: float) -> Conta
 def _independent(design: Array, heights: Array, found: _Heights, on: NDArray[np.bool_]) -> Array:
     """Give the covariance of the motion, (6, 6), if the places of both err independently.
 
-    A place of the target has a part in the heights of many of the source's: its error is in all of them.
+    A place of the target has a part in the heights of many of the source's: its error, a vector, is in all of
+    them, along the normal of each.
     """
     weights, numbers = found.weights[on], found.numbers[on]
     noise = found.noise[on]
     # Edges make some large.
     of_target = float(np.minimum(noise, _LARGE * np.median(noise)).mean())
     of_source = max(float((heights**2).mean()) - of_target * float((weights**2).sum(axis=1).mean()), 0.0)
-    together = np.zeros((int(numbers.max()) + 1, 6))
-    np.add.at(together, numbers.ravel(), (design[:, None] * weights[..., None]).reshape(-1, 6))
+    parts = design[:, None, :] * design[:, 3:, None]
+    together = np.zeros((int(numbers.max()) + 1, 18))
+    np.add.at(together, numbers.ravel(), (weights[:, :, None] * parts.reshape(-1, 1, 18)).reshape(-1, 18))
+    together = together.reshape(-1, 6)
     inverse = np.linalg.pinv(design.T @ design, rcond=1e-12, hermitian=True)
     middle = of_source * design.T @ design + of_target * together.T @ together
     return np.asarray(inverse @ middle @ inverse)
