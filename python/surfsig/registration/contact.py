@@ -19,13 +19,15 @@ _INSIDE = 0.6
 """Part of the neighbours' spread within which the fit's middle is: beyond, the place is off a rim."""
 _THICK = 0.35
 """Smallest over middle spread of neighbours that lie on a surface (standard deviations)."""
-_STRAY = 3.0
+_STRAY = 4.0
 """Standard deviations within which a place lies on the surface."""
 _FLOOR = 0.02
 """Voxels: a deviation below it is none."""
-_STEPS = 4
+_STEPS = 6
 _MOST_DRAWN = 4
 """Points in units of those that are wanted that are looked at."""
+_SMALLEST = 1e-9
+"""Of the largest area, what a point stands for at least."""
 _AROUND = 10
 """Nearest points that tell the area around one."""
 _BLOCKS = 8.0
@@ -80,7 +82,8 @@ def spread(points: Array, count: int) -> Array:
         return points
     distances, _ = cKDTree(points).query(points, k=min(_AROUND, len(points)))
     # A key of u^(1 / weight), the largest ones: Efraimidis and Spirakis, Weighted random sampling (2006).
-    area = np.maximum(distances[:, -1] ** 2, np.finfo(np.float64).tiny)
+    area = distances[:, -1] ** 2
+    area = np.maximum(area, _SMALLEST * area.max()) if area.max() > 0.0 else np.ones(len(points))
     keys = np.log(draws.random(len(points))) / area
     return np.asarray(points[np.sort(np.argpartition(-keys, count - 1)[:count])])
 
@@ -143,8 +146,10 @@ def contact(source: Array, surface: Surface, pose: Array, voxel: float) -> Conta
         found = surface.heights(moved)
         if found.there.sum() < 12:
             return None
-        spread = 1.4826 * float(np.median(np.abs(found.height[found.there])))
-        on = found.there & (np.abs(found.height) < _STRAY * max(spread, _FLOOR * voxel))
+        strays = 1.4826 * float(np.median(np.abs(found.height[found.there])))
+        # Where the target's own points stray more than elsewhere, there is an edge.
+        smooth = found.noise <= _LARGE * np.median(found.noise[found.there])
+        on = found.there & smooth & (np.abs(found.height) < _STRAY * max(strays, _FLOOR * voxel))
         places, normals, heights = moved[on], found.normal[on], found.height[on]
         center = places.mean(axis=0)
         unit = float(np.sqrt(((places - center) ** 2).sum(axis=1).mean())) or 1.0
@@ -179,9 +184,7 @@ def _independent(design: Array, heights: Array, found: _Heights, on: NDArray[np.
     them, along the normal of each.
     """
     weights, numbers = found.weights[on], found.numbers[on]
-    noise = found.noise[on]
-    # Edges make some large.
-    of_target = float(np.minimum(noise, _LARGE * np.median(noise)).mean())
+    of_target = float(found.noise[on].mean())
     of_source = max(float((heights**2).mean()) - of_target * float((weights**2).sum(axis=1).mean()), 0.0)
     parts = design[:, None, :] * design[:, 3:, None]
     together = np.zeros((int(numbers.max()) + 1, 18))

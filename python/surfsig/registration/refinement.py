@@ -11,9 +11,9 @@ Array = NDArray[np.float64]
 _REACHES = (4.0, 2.0)
 """Voxels between partners, in the rounds."""
 _NEIGHBOURS = 20
-_MOST_STEPS = 40
-_SETTLED = 1e-5
-"""Radians, and voxels: a step that is none."""
+_MOST_STEPS = 20
+_SETTLED = 3e-4, 1e-2
+"""Radians, and voxels: a step that is none. What follows takes smaller ones."""
 
 
 class Refiner:
@@ -52,8 +52,8 @@ class Refiner:
                 max_correspondence_distance=reach,
                 num_threads=1,
                 max_iterations=_MOST_STEPS,
-                rotation_epsilon=_SETTLED,
-                translation_epsilon=_SETTLED,
+                rotation_epsilon=_SETTLED[0],
+                translation_epsilon=_SETTLED[1],
             )
             if found.num_inliers == 0:
                 return pose
