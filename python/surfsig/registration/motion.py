@@ -11,7 +11,7 @@ from surfsig.point_cloud import PointCloud
 
 Array = NDArray[np.float64]
 
-_NORMALS = (("normals",), ("normal",), ("normal_x", "normal_y", "normal_z"))
+_NORMALS = (("nx", "ny", "nz"), ("normals",), ("normal",), ("normal_x", "normal_y", "normal_z"))
 """Fields that turn with a cloud."""
 
 

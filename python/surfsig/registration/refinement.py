@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import small_gicp
 from numpy.typing import NDArray
+
+from surfsig.convert.libraries import library
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,8 @@ class Refiner:
     """
 
     def __init__(self, source: Array, target: Array, voxel: float) -> None:
-        self.voxel = voxel
+        small_gicp = library("small_gicp", "small_gicp", "'surfsig[register]'")
+        self.voxel, self._align = voxel, small_gicp.align
         self.source, _ = small_gicp.preprocess_points(source / voxel, 1.0, _NEIGHBOURS, 1)
         self.target, self.tree = small_gicp.preprocess_points(target / voxel, 1.0, _NEIGHBOURS, 1)
 
@@ -43,7 +45,7 @@ class Refiner:
         scaled = pose.copy()
         scaled[:3, 3] /= self.voxel
         for reach in _REACHES:
-            found = small_gicp.align(
+            found = self._align(
                 self.target,
                 self.source,
                 self.tree,

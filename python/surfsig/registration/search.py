@@ -75,7 +75,7 @@ def register(
     Raises
     ------
     InvalidInputError
-        If an argument has no meaning; its text says which.
+        If an argument has no meaning, or small_gicp is not installed; its text says which.
     """
     clouds = [PointCloud.of(cloud) for cloud in (source, target)]
     start = None if init is None else _pose(init)
