@@ -8,7 +8,7 @@ COUNT  ?= 100000
 PREFIX ?= /usr/local
 
 # What the compiled module is made from; a change of any rebuilds it.
-SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
+SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -name '*.bin' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
 .PHONY: help demo test lint format bench bench-reading bench-error bench-segmentation fuzz docs tour wheel check-wheel header install-c clean build
 .DEFAULT_GOAL := help

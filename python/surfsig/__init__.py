@@ -17,10 +17,12 @@ from surfsig.clean import crop, downsample, remove_outliers
 from surfsig.curvature import extract, extract_radii
 from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
 from surfsig.extraction import Extraction, FitUsed, Status
+from surfsig.field import FieldMatches, FieldSignatures, field_signatures, keypoints, match_fields
 from surfsig.files import read, write
 from surfsig.flat_atom import flat_atom_length
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import Recurrence, Recurrences, recurrences
+from surfsig.registration import Registration, register
 from surfsig.shapes import FittedShape, fit_cylinder, fit_plane, fit_sphere
 from surfsig.similarity import flipped, similarity, similarity_class, similarity_matrix
 from surfsig.surfaces import PointClass, Surface, Surfaces, surfaces
@@ -28,6 +30,8 @@ from surfsig.surfaces import PointClass, Surface, Surfaces, surfaces
 __all__ = [
     "INSTRUCTION_SET",
     "Extraction",
+    "FieldMatches",
+    "FieldSignatures",
     "FileFormatError",
     "FitUsed",
     "FittedShape",
@@ -37,6 +41,7 @@ __all__ = [
     "PointCloud",
     "Recurrence",
     "Recurrences",
+    "Registration",
     "Status",
     "Surface",
     "Surfaces",
@@ -46,13 +51,17 @@ __all__ = [
     "downsample",
     "extract",
     "extract_radii",
+    "field_signatures",
     "fit_cylinder",
     "fit_plane",
     "fit_sphere",
     "flat_atom_length",
     "flipped",
+    "keypoints",
+    "match_fields",
     "read",
     "recurrences",
+    "register",
     "remove_outliers",
     "similarity",
     "similarity_class",

@@ -20,6 +20,7 @@ __all__ = [
     "SurfacePlaces",
     "__version__",
     "extract",
+    "field_signatures",
     "find_surfaces",
     "fit_primitive",
     "voxel_representatives",
@@ -49,6 +50,18 @@ def extract(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> list[dict[str, NDArray[Any]]]: ...
+def field_signatures(
+    points: NDArray[np.floating],
+    *,
+    origin: Sequence[float],
+    radius: float,
+    at: NDArray[np.uint32] | NDArray[np.float64] | None = None,
+    viewpoint: Sequence[float] | None = None,
+    directions: NDArray[np.float32] | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+    pools: bool = False,
+) -> dict[str, NDArray[Any]]: ...
 def find_surfaces(
     points: NDArray[np.floating],
     *,

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from surfsig import _surfsig
 from surfsig.arguments import (
     MOST_NEIGHBORS,
     positive_length,
-    query_places,
     thread_count,
     whole_number,
 )
@@ -21,6 +20,7 @@ from surfsig.defaults import AXES, FIT, Axes, Fit
 from surfsig.errors import InvalidInputError
 from surfsig.extraction import Extraction
 from surfsig.orientation import orientation
+from surfsig.places import places
 from surfsig.point_cloud import PointCloud
 
 
@@ -177,7 +177,7 @@ class _Job:
         """Extract, once for each radius."""
         self._check()
         origin: Sequence[float] = cloud.origin.tolist()
-        query, indices, points = self._places(cloud)
+        query, indices, points = places(cloud, self.at, self.voxel)
         sensor, directions = orientation(cloud, self.viewpoint, self.normals, indices)
         found: list[dict[str, Any]] = _surfsig.extract(
             cloud.offsets,
@@ -213,18 +213,3 @@ class _Job:
             raise InvalidInputError(f"fit must be 'paraboloid', 'quadric' or 'auto', not {self.fit!r}")
         if self.fit != "paraboloid" and self.axes == "sensor":
             raise InvalidInputError("only fit='paraboloid' is fitted in the sensor's axes")
-        if self.at is not None and self.voxel is not None:
-            raise InvalidInputError("at and voxel exclude each other")
-
-    def _places(
-        self, cloud: PointCloud
-    ) -> tuple[NDArray[np.uint32] | NDArray[np.float64] | None, NDArray[np.int64] | None, NDArray[Any]]:
-        """Return the places as the core takes them, their numbers in the cloud, and where they are."""
-        if self.voxel is not None:
-            voxel = positive_length(self.voxel, "voxel")
-            chosen = _surfsig.voxel_representatives(cloud.offsets, origin=cloud.origin.tolist(), voxel=voxel)
-            return chosen, chosen.astype(np.int64), cloud.points[chosen]
-        if self.at is None:
-            return None, np.arange(len(cloud)), cloud.points
-        query, indices = query_places(self.at, len(cloud))
-        return query, indices, query if indices is None else cloud.points[indices]

@@ -3,6 +3,7 @@
 mod depth_image;
 mod e57;
 mod extract;
+mod field;
 mod frame;
 mod primitive;
 mod python_file;
@@ -56,6 +57,8 @@ mod _surfsig {
     use crate::e57::{E57Reader, write_e57};
     #[pymodule_export]
     use crate::extract::{extract, voxel_representatives};
+    #[pymodule_export]
+    use crate::field::field_signatures;
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]

@@ -37,6 +37,7 @@ mod curvature;
 mod depth_image;
 mod error;
 mod extract;
+mod field;
 mod fit;
 mod frame;
 mod hierarchy;
@@ -57,6 +58,10 @@ pub use error::Error;
 pub use extract::{
     ExtractOptions, Extraction, Monitor, Neighborhood, Queries, Status, extract, extract_auto_radius,
     extract_monitored, extract_radii, voxel_representatives,
+};
+pub use field::{
+    FIELD_PHASES, FIELD_SIGNATURE, FieldOptions, FieldPatches, FieldPhases, FieldSignature, field_pools,
+    field_signatures,
 };
 pub use fit::{
     Cylinder, FitAxes, FitKind, FitUsed, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere,

@@ -33,12 +33,22 @@ impl Queries<'_> {
         }
     }
 
-    pub(super) fn check(&self, cloud: &PointCloud<'_>) -> Result<(), Error> {
+    pub(crate) fn check(&self, cloud: &PointCloud<'_>) -> Result<(), Error> {
         let Self::Indices(indices) = self else { return Ok(()) };
         match indices.iter().find(|&&i| i as usize >= cloud.len()) {
             Some(&index) => Err(Error::IndexOutOfRange { index: index as usize, len: cloud.len() }),
             None => Ok(()),
         }
+    }
+
+    /// Where they are; not a number where a coordinate is not finite.
+    pub(crate) fn positions<'a>(&'a self, cloud: &'a PointCloud<'_>) -> impl Iterator<Item = [f64; 3]> + 'a {
+        let position = |i| match self {
+            Self::All => cloud.position(i),
+            Self::Indices(indices) => cloud.position(indices[i] as usize),
+            Self::Positions(positions) => positions.position(i),
+        };
+        (0..self.len(cloud)).map(move |i| position(i).unwrap_or([f64::NAN; 3]))
     }
 
     /// Those with the given numbers.

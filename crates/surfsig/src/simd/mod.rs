@@ -1,7 +1,8 @@
-//! The only rooms with `unsafe`: the two kernels that touch every point of every ball, and the lanes
+//! The only rooms with `unsafe`: the kernels that touch every point of every ball, and the lanes
 //! in which many fits are solved at once.
 
 pub(crate) mod accumulate;
+pub(crate) mod field;
 pub(crate) mod instruction_set;
 pub(crate) mod lanes;
 pub(crate) mod partition;
