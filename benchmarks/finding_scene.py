@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import surfsig
 from surfsig import simulate
+from surfsig.simulate.ellipsoid import Ellipsoid
 
 Array = NDArray[np.float64]
 
@@ -23,7 +24,15 @@ RAISED = 0.038
 BOARD = (0.025, 0.075, 0.003)
 
 OBJECTS: dict[str, list[tuple[simulate.Surface, Array]]] = {
-    "bracket": KINDS["bracket"],
+    "figure": [
+        (Ellipsoid((0.014, 0.018, 0.022)), simulate.pose((0.0, 0.0, -0.004))),
+        (simulate.Sphere(0.011), simulate.pose((0.002, 0.0, 0.024))),
+        (
+            simulate.Cylinder(0.005, 0.044),
+            simulate.pose((0.006, 0.008, 0.004), simulate.turn((1, 0, 0), 1.1)),
+        ),
+        (simulate.Box((0.024, 0.034, 0.006)), simulate.pose((0.004, 0.0, -0.027))),
+    ],
     "bracket with pin": [
         *KINDS["bracket"],
         (simulate.Cylinder(0.006, 0.024), simulate.pose((0.012, 0.004, 0.0))),

@@ -17,8 +17,10 @@ from surfsig.cli.compare import compare_command
 from surfsig.cli.completion import completion_command
 from surfsig.cli.convert import convert_command
 from surfsig.cli.extract import extract_command
+from surfsig.cli.find import find_command
 from surfsig.cli.fit import fit_command
 from surfsig.cli.info import info_command
+from surfsig.cli.library import library_command
 from surfsig.cli.paper import paper_command
 from surfsig.cli.surfaces import surfaces_command
 from surfsig.errors import SurfsigError
@@ -53,6 +55,8 @@ for command in (
     extract_command,
     fit_command,
     surfaces_command,
+    find_command,
+    library_command,
     compare_command,
     convert_command,
     paper_command,

@@ -80,9 +80,9 @@ class Witness:
         """Weigh a pose; `free` are the scene's places that no other instance explains, (m,)."""
         if self.eye is None:
             _, partners = self._partners(pose, 1.0)
-            confirmed = free[partners]
-            seen = float(confirmed.sum() / len(self.places))
-            spread = _spread(self.around.normals[partners[confirmed]])
+            unexplained = partners[free[partners]]
+            seen = len(unexplained) / len(self.places)
+            spread = _spread(self.around.normals[unexplained])
             return Evidence(_flat(seen / self.most_seen, spread), min(seen, 1.0))
         facing = self.facing(pose)
         image = self.around.image(pose[:3, 3], self.reach, self.eye, free)

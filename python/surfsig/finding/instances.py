@@ -113,8 +113,18 @@ class Instances:
         The names of the columns, and a row for each: its number, the model's name, score, visible share,
         where the model's origin is, its turn as a rotation vector in degrees, rms, points, free directions.
         """
-        header = ("", "model", "score", "visible", "at", "turned, degrees", "rms", "points", "free directions")
-        rows = []
+        header = (
+            "",
+            "model",
+            "score",
+            "visible",
+            "at",
+            "turned, degrees",
+            "rms",
+            "points",
+            "free directions",
+        )
+        rows: list[tuple[str, ...]] = []
         for number, instance in enumerate(self.instances):
             turn = Rotation.from_matrix(instance.T_scene_model[:3, :3]).as_rotvec(degrees=True)
             rows.append(

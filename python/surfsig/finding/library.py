@@ -199,7 +199,8 @@ class Library:
         try:
             with closing(sqlite3.connect(self.path, timeout=30.0)) as store, store:
                 mark, version = (
-                    store.execute(f"PRAGMA {what}").fetchone()[0] for what in ("application_id", "user_version")
+                    store.execute(f"PRAGMA {what}").fetchone()[0]
+                    for what in ("application_id", "user_version")
                 )
                 tables = store.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
                 if create and not tables and mark == 0:
@@ -209,7 +210,9 @@ class Library:
                 elif mark != _MARK:
                     raise FileFormatError(f"{self.path}: not a library of models")
                 elif version > _VERSION:
-                    raise FileFormatError(f"{self.path}: a library of version {version}; this knows {_VERSION}")
+                    raise FileFormatError(
+                        f"{self.path}: a library of version {version}; this knows {_VERSION}"
+                    )
                 yield store
         except sqlite3.IntegrityError:
             raise
@@ -225,7 +228,10 @@ class Library:
 
 def _packed(model: Model) -> tuple[bytes, int]:
     arrays: dict[str, NDArray[Any]] = {
-        "points": model.points, "middle": model.middle, "places": model.places, "normals": model.normals
+        "points": model.points,
+        "middle": model.middle,
+        "places": model.places,
+        "normals": model.normals,
     }
     arrays |= {f"signature_{name}": getattr(model.signatures, name) for name in _SIGNATURES}
     file = io.BytesIO()

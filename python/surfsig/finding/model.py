@@ -117,15 +117,11 @@ def described(
     """Describe points (n, 3) with normals (n, 3), of which the side counts."""
     places, facing = surface_places(points, normals, max(radius / _VOXELS, spacing), threads)
     signatures = field_signatures(points, radius, voxel=radius / PLACES, normals=normals, threads=threads)
-    return Model(
-        points, middle, spacing, radius, places, facing, signatures.take(signatures.ok), sided
-    )
+    return Model(points, middle, spacing, radius, places, facing, signatures.take(signatures.ok), sided)
 
 
-def surface_places(
-    points: Array, normals: Array, voxel: float, threads: int | None
-) -> tuple[Array, Array]:
-    """Give a place of each voxel, (m, 3), and the surface's normal there, (m, 3), on the side of given ones."""
+def surface_places(points: Array, normals: Array, voxel: float, threads: int | None) -> tuple[Array, Array]:
+    """Give a place of each voxel, (m, 3), and the normal there, (m, 3), on the side of given ones."""
     found = extract(points, radius=NORMAL_BALL * voxel, voxel=voxel, normals=normals, threads=threads)
     known = np.isfinite(found.normals).all(axis=1)
     return found.points[known].astype(np.float64), found.normals[known].astype(np.float64)

@@ -67,7 +67,7 @@ def proposed_poses(model: FieldSignatures, scene: FieldSignatures, most: int) ->
 
 
 def _mean_pose(middles: Array, quaternions: Array, numbers: NDArray[np.int64], weights: Array) -> Array:
-    """Average poses near each other; numbers beyond the poses' count are those with the negative quaternion."""
+    """Average poses near each other; numbers beyond their count have the negative quaternion."""
     count = len(middles)
     sign = np.where(numbers < count, 1.0, -1.0)[:, None]
     which = numbers % count

@@ -18,7 +18,7 @@ from surfsig.finding.instances import Instance, Instances
 from surfsig.finding.library import Library
 from surfsig.finding.model import FEWEST, SPACINGS, Model, model_of
 from surfsig.finding.proposals import proposed_poses
-from surfsig.finding.scene import Scene, Surroundings
+from surfsig.finding.scene import Scene
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences.free_directions import free_directions
 from surfsig.registration.contact import Surface, contact
@@ -26,8 +26,10 @@ from surfsig.registration.motion import shifted
 
 Array = NDArray[np.float64]
 
-_PROPOSALS, _TRIED = 300, 40
+_PROPOSALS, _TRIED = 1000, 60
 """Poses that are settled and judged by few places, and of those that differ, by all."""
+_SPACINGS_APART = 1.5
+"""Of the scene's point spacings, between places at least: steep surfaces have fewer points."""
 _COARSE = 2.0
 """Voxels of the first judgement, in those of the last."""
 _FEW, _MANY = 600, 6000
@@ -124,7 +126,7 @@ def _candidates(
     """Give poses of a model that are good enough where no other instance is near."""
     if model.radius < SPACINGS * scene.spacing:
         model = model.with_radius(SPACINGS * scene.spacing, threads)
-    voxel = max(model.voxel, model.spacing, scene.spacing)
+    voxel = max(model.voxel, model.spacing, _SPACINGS_APART * scene.spacing)
     signatures = scene.signatures(model.radius)
     coarse, fine = scene.surroundings(_COARSE * voxel), scene.surroundings(voxel)
     sides = [model] if model.sided and scene.sided else [model, model.inside_out(threads)]
