@@ -39,7 +39,7 @@ class Evidence:
     """What a scene says about a pose."""
 
     score: float
-    """Confirmed less wrong places, over the most of the model that can be seen at once: 1 where all is seen."""
+    """Confirmed less wrong places, over the most of the model that can be seen at once."""
     visible: float
     """Share of what faces the sensor that is seen, 0 to 1; of all where its place is not known."""
 

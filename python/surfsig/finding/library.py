@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import sqlite3
+import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -188,7 +189,7 @@ class Library:
             raise self._missing(name)
         try:
             return _unpacked(*rows[0])
-        except (ValueError, KeyError, TypeError, OSError, zlib.error, EOFError):
+        except (ValueError, KeyError, TypeError, zlib.error, zipfile.BadZipFile):
             raise FileFormatError(f"{self.path}: the model {name!r} is damaged") from None
 
     @contextmanager
@@ -243,6 +244,8 @@ def _unpacked(radius: float, spacing: float, sided: int, size: int, packed: byte
     if not 0 < size <= min(_LARGEST, 1100 * len(packed)):
         raise ValueError("a size that the data cannot have")
     content = zlib.decompressobj().decompress(packed, size)
+    if len(content) != size:
+        raise ValueError("shorter than it was")
     with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
         signatures = FieldSignatures(
             radius=radius,
