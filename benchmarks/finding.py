@@ -58,9 +58,10 @@ def scored(scene: FindingScene, found: surfsig.Instances) -> Score:
 def main() -> None:
     """Run the scenes, and print a line for each."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4, 5, 6])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
+    parser.add_argument("--objects", choices=list(OBJECTS), nargs="+", default=list(OBJECTS))
     options = parser.parse_args()
-    for name in OBJECTS:
+    for name in options.objects:
         model = whole(name)
         for seed in options.seeds:
             for copies in (5, 0):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from surfsig._surfsig import SurfacePlaces
@@ -28,6 +29,11 @@ poses hardly any place is seen through, but sensors miss dark and shiny ones."""
 _ROUND = 0.1
 """Spread of confirmed normals (1 less the largest eigenvalue of their second moments) from which on they are
 more than a plane, which anything has."""
+_BESIDE = (1.5, 4.0)
+"""Voxels from a whole model within which the scene must not go on where the model ends: there, the model lies
+in a larger surface, as a box sunk in a table."""
+_CONTINUED = 4.0
+"""What a place of the scene that does counts, in confirmed ones."""
 _STEPS = 12
 _REACHES = (4.0, 1.5)
 """Voxels between partners, in the first and the last step of settling."""
@@ -52,10 +58,15 @@ class Witness:
         chosen = np.random.default_rng(0).permutation(len(model.places))[:most]
         self.places, self.normals = model.places[chosen], model.normals[chosen]
         self.surface = SurfacePlaces(self.places.astype(np.float32), self.normals.astype(np.float32))
+        self._rim = cKDTree(model.places) if model.closed and most is None else None
+        self._normals = model.normals
         self.around, self.eye, self.reach = around, eye, _REACH * model.extent
         sights = np.random.default_rng(0).normal(size=(_SIGHTS, 3))
         sights /= np.linalg.norm(sights, axis=1, keepdims=True)
         self.most_seen = float((self.normals @ sights.T > _STEEP).mean(axis=0).max())
+        side = max(model.voxel, model.spacing) / around.voxel
+        self._scene_places = len(model.places) * side**2
+        """How many of the scene's would cover the model."""
 
     def settled(self, pose: Array) -> Array:
         """Fit a pose to the scene's surface near it, by point to plane; free directions are left alone."""
@@ -83,7 +94,8 @@ class Witness:
             unexplained = partners[free[partners]]
             seen = len(unexplained) / len(self.places)
             spread = _spread(self.around.normals[unexplained])
-            return Evidence(_flat(seen / self.most_seen, spread), min(seen, 1.0))
+            score = (seen - _CONTINUED * self._continued(pose)) / self.most_seen
+            return Evidence(_flat(score, spread), min(seen, 1.0))
         facing = self.facing(pose)
         image = self.around.image(pose[:3, 3], self.reach, self.eye, free)
         local = pose.copy()
@@ -92,7 +104,8 @@ class Witness:
             float(share) for share in image.judge(local[None], self.surface, _ALL, self.around.voxel)[0]
         )
         _, _, normals = image.correspondences(local, self.surface, _ALL, self.around.voxel)
-        score = (confirmed - _CONTRADICTED * contradicted - _MISSING * missing) / self.most_seen
+        wrong = _CONTRADICTED * contradicted + _MISSING * missing + _CONTINUED * self._continued(pose)
+        score = (confirmed - wrong) / self.most_seen
         visible = min(confirmed / max(float(facing.mean()), confirmed, 1e-9), 1.0)
         return Evidence(_flat(score, _spread(normals)), visible)
 
@@ -103,6 +116,22 @@ class Witness:
         ways = self.eye - (self.places @ pose[:3, :3].T + pose[:3, 3])
         along = np.einsum("ij,ij->i", self.normals @ pose[:3, :3].T, ways)
         return np.asarray(along > _STEEP * np.linalg.norm(ways, axis=1))
+
+    def _continued(self, pose: Array) -> float:
+        """Give how much of the scene goes on where a whole model ends, as a share of the model's surface."""
+        if self._rim is None:
+            return 0.0
+        near = self.around.tree.query_ball_point(pose[:3, 3], self.reach)
+        places = (self.around.places[near] - pose[:3, 3]) @ pose[:3, :3]
+        normals = self.around.normals[near] @ pose[:3, :3]
+        low, high = (side * self.around.voxel for side in _BESIDE)
+        distances, partners = self._rim.query(places, distance_upper_bound=high)
+        beside = np.flatnonzero(np.isfinite(distances) & (distances > low))
+        partners = partners[beside]
+        facing = self._normals[partners]
+        heights = np.einsum("ij,ij->i", places[beside] - self._rim.data[partners], facing)
+        alike = np.einsum("ij,ij->i", normals[beside], facing) > _ALIKE
+        return float((alike & (np.abs(heights) < 0.5 * low)).sum()) / self._scene_places
 
     def _partners(self, pose: Array, reach: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Give places of the model with a partner in the scene that faces alike, and the partners."""

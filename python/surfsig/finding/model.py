@@ -65,6 +65,11 @@ class Model:
         return self.radius / _VOXELS
 
     @property
+    def closed(self) -> bool:
+        """Whether the surface goes all around."""
+        return float(np.linalg.norm(self.normals.mean(axis=0))) < _CLOSED
+
+    @property
     def extent(self) -> float:
         """Largest distance of a point from `middle`."""
         return float(np.linalg.norm(self.points, axis=1).max())

@@ -32,8 +32,8 @@ _SPACINGS_APART = 1.5
 """Of the scene's point spacings, between places at least: steep surfaces have fewer points."""
 _COARSE = 2.0
 """Voxels of the first judgement, in those of the last."""
-_FEW, _MANY = 600, 6000
-"""Places of the model that are looked at."""
+_FEW = 600
+"""Places of the model that are looked at in the first judgement."""
 _SAME_MIDDLE, _SAME_TURN = 0.25, 0.2
 """Radii of a patch, and radians, within which two poses are one."""
 _OWN = 1.5
@@ -132,7 +132,7 @@ def _candidates(
     sides = [model] if model.sided and scene.sided else [model, model.inside_out(threads)]
     found: list[tuple[float, _Candidate]] = []
     for side in sides:
-        first, last = Witness(side, coarse, eye, _FEW), Witness(side, fine, eye, _MANY)
+        first, last = Witness(side, coarse, eye, _FEW), Witness(side, fine, eye, None)
         settled = [first.settled(pose) for pose in proposed_poses(side.signatures, signatures, _PROPOSALS)]
         scores = [first.judged(pose, coarse.all_free).score for pose in settled]
         poses = [settled[number] for number in np.argsort(-np.array(scores), kind="stable")]
