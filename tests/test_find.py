@@ -86,6 +86,12 @@ def test_far_away_coordinates_change_nothing() -> None:
     assert errors(pose, scene.poses[0])[0] < 0.001
 
 
+def test_a_scene_in_its_sensor_s_axes_needs_no_viewpoint(five: surfsig.Instances) -> None:
+    scene = finding_scene("figure", 1)
+    found = surfsig.find(whole("figure"), surfsig.PointCloud(scene.cloud.offsets))
+    assert [instance.score for instance in found.instances] == [instance.score for instance in five.instances]
+
+
 def test_a_closed_surface_is_not_seen_from_one_place() -> None:
     ways = np.random.default_rng(0).normal(size=(20_000, 3))
     ball = ways / np.linalg.norm(ways, axis=1, keepdims=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,10 @@ class Scene:
         self.points: Array = self._cloud.offsets
         self.spacing = point_spacing(self.points)
         self._threads = threads
+        origin = cloud.origin - self.middle
+        if cloud.viewpoint is None and cloud.viewpoints is None and self._seen_from(origin):
+            # Most sensors are at the origin of their own coordinates.
+            self._cloud = replace(self._cloud, viewpoint=origin)
         self._normals, self.sided = sides_of(self._cloud, radius, threads)
         self._parts: dict[float, Surroundings] = {}
         self._signatures: dict[float, FieldSignatures] = {}
@@ -87,4 +92,7 @@ class Scene:
         eye = self._cloud.viewpoint
         if self._cloud.viewpoints is not None:
             eye = self._cloud.viewpoints[self._cloud.fields["scan"]].mean(axis=0)
-        return eye if eye is not None and seen_from(eye, self.points, self.spacing) else None
+        return eye if eye is not None and self._seen_from(eye) else None
+
+    def _seen_from(self, eye: Array) -> bool:
+        return seen_from(eye, self.points, self.spacing)

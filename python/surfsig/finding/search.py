@@ -70,7 +70,8 @@ def find(
         view of it; a `Library`, or a mapping of names to clouds, for several. In the scene's unit.
     scene
         A cloud alike. Where it has a viewpoint, or one for each value of its field ``scan``, free space
-        counts; otherwise only what is confirmed does, which tells less.
+        counts, or where all of it can have been seen from its origin; otherwise only what is confirmed does,
+        and instances that are none are found, too: a higher `score` leaves them out.
     score
         Of an instance, at least: 1 is as much as can be seen of the model at once, with nothing against it.
     threads
