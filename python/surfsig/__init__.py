@@ -19,6 +19,7 @@ from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
 from surfsig.extraction import Extraction, FitUsed, Status
 from surfsig.field import FieldMatches, FieldSignatures, field_signatures, keypoints, match_fields
 from surfsig.files import read, write
+from surfsig.finding import Instance, Instances, Library, LibraryEntry, find
 from surfsig.flat_atom import flat_atom_length
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import Recurrence, Recurrences, recurrences
@@ -36,7 +37,11 @@ __all__ = [
     "FitUsed",
     "FittedShape",
     "Frame",
+    "Instance",
+    "Instances",
     "InvalidInputError",
+    "Library",
+    "LibraryEntry",
     "PointClass",
     "PointCloud",
     "Recurrence",
@@ -52,6 +57,7 @@ __all__ = [
     "extract",
     "extract_radii",
     "field_signatures",
+    "find",
     "fit_cylinder",
     "fit_plane",
     "fit_sphere",

@@ -17,8 +17,10 @@ from surfsig.cli.compare import compare_command
 from surfsig.cli.completion import completion_command
 from surfsig.cli.convert import convert_command
 from surfsig.cli.extract import extract_command
+from surfsig.cli.find import find_command
 from surfsig.cli.fit import fit_command
 from surfsig.cli.info import info_command
+from surfsig.cli.library import library_command
 from surfsig.cli.paper import paper_command
 from surfsig.cli.register import register_command
 from surfsig.cli.surfaces import surfaces_command
@@ -55,6 +57,8 @@ for command in (
     fit_command,
     surfaces_command,
     register_command,
+    find_command,
+    library_command,
     compare_command,
     convert_command,
     paper_command,
