@@ -17,6 +17,7 @@ __all__ = [
     "E57Reader",
     "Frame",
     "Primitive",
+    "SurfaceIndex",
     "SurfacePlaces",
     "__version__",
     "extract",
@@ -91,6 +92,20 @@ def write_e57(
 @final
 class SurfacePlaces:
     def __new__(cls, places: NDArray[np.float32], normals: NDArray[np.float32]) -> SurfacePlaces: ...
+
+@final
+class SurfaceIndex:
+    def __new__(cls, places: SurfacePlaces, cell: float) -> SurfaceIndex: ...
+    def partners(
+        self, poses: NDArray[np.float64], places: SurfacePlaces, reach: float
+    ) -> NDArray[np.int64]: ...
+    def settle(
+        self,
+        poses: NDArray[np.float64],
+        places: SurfacePlaces,
+        reaches: NDArray[np.float32],
+        threads: int | None = None,
+    ) -> NDArray[np.float64]: ...
 
 @final
 class DepthImage:

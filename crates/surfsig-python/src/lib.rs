@@ -7,6 +7,7 @@ mod field;
 mod frame;
 mod primitive;
 mod python_file;
+mod surface_index;
 mod surfaces;
 
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
@@ -63,6 +64,8 @@ mod _surfsig {
     use crate::frame::Frame;
     #[pymodule_export]
     use crate::primitive::{Primitive, fit_primitive};
+    #[pymodule_export]
+    use crate::surface_index::SurfaceIndex;
     #[pymodule_export]
     use crate::surfaces::find_surfaces;
 

@@ -312,7 +312,7 @@ fn axes_towards(forward: [f64; 3]) -> [[f32; 3]; 3] {
     [side, forward.cross(&side), forward].map(|axis| axis.map(|x| x as f32).into())
 }
 
-fn dot(a: &[f32; 3], b: &[f32; 3]) -> f32 {
+pub(crate) fn dot(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 

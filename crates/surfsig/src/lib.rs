@@ -48,6 +48,7 @@ mod primitive;
 mod shells;
 mod simd;
 mod similarity;
+mod surface_index;
 mod surfaces;
 mod threads;
 
@@ -72,5 +73,6 @@ pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
 pub use simd::InstructionSet;
 pub use similarity::{GOOD, OPTIMAL, SimilarityClass, similarity};
+pub use surface_index::SurfaceIndex;
 pub use surfaces::{FEWEST_SURFACE_POINTS, FoundSurface, FoundSurfaces, SurfaceOptions, find_surfaces};
 pub use threads::with_threads;

@@ -120,16 +120,23 @@ def described(
     threads: int | None = None,
 ) -> Model:
     """Describe points (n, 3) with normals (n, 3), of which the side counts."""
-    places, facing = surface_places(points, normals, max(radius / _VOXELS, spacing), threads)
+    places, facing, _ = surface_places(points, normals, max(radius / _VOXELS, spacing), threads)
     signatures = field_signatures(points, radius, voxel=radius / PLACES, normals=normals, threads=threads)
     return Model(points, middle, spacing, radius, places, facing, signatures.take(signatures.ok), sided)
 
 
-def surface_places(points: Array, normals: Array, voxel: float, threads: int | None) -> tuple[Array, Array]:
-    """Give a place of each voxel, (m, 3), and the normal there, (m, 3), on the side of given ones."""
+def surface_places(
+    points: Array, normals: Array, voxel: float, threads: int | None
+) -> tuple[Array, Array, float]:
+    """Give a place of each voxel, (m, 3), the normals there, (m, 3), on the side of given ones, and the noise."""
     found = extract(points, radius=NORMAL_BALL * voxel, voxel=voxel, normals=normals, threads=threads)
     known = np.isfinite(found.normals).all(axis=1)
-    return found.points[known].astype(np.float64), found.normals[known].astype(np.float64)
+    noise = found.noise[np.isfinite(found.noise)]
+    return (
+        found.points[known].astype(np.float64),
+        found.normals[known].astype(np.float64),
+        float(np.median(noise)) if len(noise) else 0.0,
+    )
 
 
 def sides_of(cloud: PointCloud, radius: float, threads: int | None) -> tuple[Array, bool]:

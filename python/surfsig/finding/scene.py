@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from surfsig._surfsig import DepthImage, SurfacePlaces
+from surfsig._surfsig import DepthImage, SurfaceIndex, SurfacePlaces
 from surfsig.field import FieldSignatures, field_signatures
 from surfsig.finding.model import PLACES, sides_of, surface_places
 from surfsig.finding.visible_from import seen_from
@@ -19,13 +19,18 @@ from surfsig.registration.motion import about_zero
 
 Array = NDArray[np.float64]
 
+_CELL = 4.0
+"""Voxels of a cell of the surface's index."""
+
 
 class Surroundings:
     """The surface of a scene, one place per voxel, and which of them no instance explains yet."""
 
-    def __init__(self, places: Array, normals: Array, voxel: float) -> None:
-        self.places, self.normals, self.voxel = places, normals, voxel
+    def __init__(self, places: Array, normals: Array, noise: float, voxel: float) -> None:
+        self.places, self.normals, self.noise, self.voxel = places, normals, noise, voxel
         self.tree = cKDTree(places)
+        surface = SurfacePlaces(places.astype(np.float32), normals.astype(np.float32))
+        self.index = SurfaceIndex(surface, _CELL * voxel)
         self.all_free = np.ones(len(places), np.bool_)
         self.free = self.all_free.copy()
 

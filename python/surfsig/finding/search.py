@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from surfsig.arguments import thread_count
 from surfsig.defaults import INSTANCE_SCORE
 from surfsig.errors import InvalidInputError
-from surfsig.finding.evidence import Witness
+from surfsig.finding.evidence import Evidence, Witness
 from surfsig.finding.instances import Instance, Instances
 from surfsig.finding.library import Library
 from surfsig.finding.model import FEWEST, SPACINGS, Model, model_of
@@ -30,10 +30,15 @@ _PROPOSALS, _TRIED = 1000, 60
 """Poses that are settled and judged by few places, and of those that differ, by all."""
 _SPACINGS_APART = 1.5
 """Of the scene's point spacings, between places at least: steep surfaces have fewer points."""
+_NOISES_APART = 2.5
+"""Of the scene's noise, between places at least, so that equal surfaces are well within a voxel."""
 _COARSE = 2.0
 """Voxels of the first judgement, in those of the last."""
 _FEW = 600
 """Places of the model that are looked at in the first judgement."""
+_FIRST_REACHES = np.geomspace(4.0, 1.5, 12)
+_LAST_REACHES = np.geomspace(4.0, 1.5, 8)
+"""Voxels between partners, in the steps of settling."""
 _SAME_MIDDLE, _SAME_TURN = 0.25, 0.2
 """Radii of a patch, and radians, within which two poses are one."""
 _OWN = 1.5
@@ -128,24 +133,30 @@ def _candidates(
     if model.radius < SPACINGS * scene.spacing:
         model = model.with_radius(SPACINGS * scene.spacing, threads)
     voxel = max(model.voxel, model.spacing, _SPACINGS_APART * scene.spacing)
+    voxel = max(voxel, _NOISES_APART * scene.surroundings(voxel).noise)
     signatures = scene.signatures(model.radius)
     coarse, fine = scene.surroundings(_COARSE * voxel), scene.surroundings(voxel)
     sides = [model] if model.sided and scene.sided else [model, model.inside_out(threads)]
     found: list[tuple[float, _Candidate]] = []
     for side in sides:
         first, last = Witness(side, coarse, eye, _FEW), Witness(side, fine, eye, None)
-        settled = [first.settled(pose) for pose in proposed_poses(side.signatures, signatures, _PROPOSALS)]
-        scores = [first.judged(pose, coarse.all_free).score for pose in settled]
-        poses = [settled[number] for number in np.argsort(-np.array(scores), kind="stable")]
-        for pose in _different(poses, side.radius)[:_TRIED]:
-            better = last.settled(pose)
-            score = last.judged(better, fine.all_free).score
-            if score >= least:
-                found.append((score, _Candidate(name, last, side, better)))
+        poses = proposed_poses(side.signatures, signatures, _PROPOSALS)
+        if not len(poses):
+            continue
+        poses = first.settled(poses, _FIRST_REACHES, threads)
+        scores = np.array([evidence.score for evidence in first.judged(poses, coarse.all_free)])
+        order = np.argsort(-scores, kind="stable")
+        tried = _different(poses[order[scores[order] > 0.0]], side.radius)[:_TRIED]
+        if not tried:
+            continue
+        better = last.settled(np.array(tried), _LAST_REACHES, threads)
+        for pose, evidence in zip(better, last.judged(better, fine.all_free), strict=True):
+            if evidence.score >= least:
+                found.append((evidence.score, _Candidate(name, last, side, pose)))
     return [candidate for _, candidate in sorted(found, key=lambda pair: -pair[0])]
 
 
-def _different(poses: list[Array], radius: float) -> list[Array]:
+def _different(poses: Array, radius: float) -> list[Array]:
     """Leave out poses that are one with an earlier one."""
     kept: list[Array] = []
     for pose in poses:
@@ -163,8 +174,7 @@ def _accepted(candidates: list[_Candidate], scene: Scene, least: float) -> Insta
     instances: list[Instance] = []
     taken = np.zeros(len(scene.points), np.bool_)
     while candidates:
-        judged = [c.witness.judged(c.pose, c.witness.around.free) for c in candidates]
-        scores = np.array([evidence.score for evidence in judged])
+        scores = np.array([_weighed(candidate).score for candidate in candidates])
         kept = np.flatnonzero(scores >= least)
         if not len(kept):
             break
@@ -177,6 +187,11 @@ def _accepted(candidates: list[_Candidate], scene: Scene, least: float) -> Insta
     return Instances(instances, scene.given)
 
 
+def _weighed(candidate: _Candidate) -> Evidence:
+    """Judge a candidate by what no instance explains yet."""
+    return candidate.witness.judged(candidate.pose[None], candidate.witness.around.free)[0]
+
+
 def _instance(candidate: _Candidate, scene: Scene, taken: NDArray[np.bool_]) -> Instance | None:
     """Fit the last steps, and take what is explained away."""
     witness, model = candidate.witness, candidate.model
@@ -187,7 +202,7 @@ def _instance(candidate: _Candidate, scene: Scene, taken: NDArray[np.bool_]) -> 
     )
     if touching is None:
         return None
-    evidence = witness.judged(touching.pose, around.free)
+    evidence = _weighed(replace(candidate, pose=touching.pose))
     surface = cKDTree(model.places @ touching.pose[:3, :3].T + touching.pose[:3, 3])
     reach = _OWN * around.voxel
     for part in scene.parts():
