@@ -33,8 +33,8 @@ _TOUCHING = 1.0
 _ALIKE = 0.8
 """Cosine between normals from which on they count as alike, as the core has it."""
 _BY_CHANCE = (0.5, 0.75)
-"""Mean agreement in height and normal, of 1, that another shape reaches where it touches by chance (0.4 to 0.6),
-and that equal surfaces reach (0.76 to 0.97, on simulated and real scans)."""
+"""Mean agreement in height and normal, of 1, that another shape reaches where it touches by chance (0.4 to
+0.6), and that equal surfaces reach (0.76 to 0.97, on simulated and real scans)."""
 _ALL = 1 << 40
 
 
@@ -46,6 +46,8 @@ class Evidence:
     """Confirmed less wrong places, over the most of the model that can be seen at once."""
     visible: float
     """Share of what faces the sensor that is seen, 0 to 1; of all where its place is not known."""
+    overlap: float
+    """Share of the model's surface that lies on the scene's, 0 to 1."""
 
 
 class Witness:
@@ -90,7 +92,8 @@ class Witness:
             scores[number] *= min(_spread(self.normals[touching]) / _ROUND, 1.0)
             scores[number] *= self._rim.ends(pose, touching, self.around, free)
             scores[number] *= self._fits(pose, touching, partners[number])
-        return [Evidence(float(score), float(share)) for score, share in zip(scores, seen, strict=True)]
+        overlaps = (partners >= 0).mean(axis=1)
+        return [Evidence(*map(float, row)) for row in zip(scores, seen, overlaps, strict=True)]
 
     def facing(self, pose: Array) -> NDArray[np.bool_]:
         """Tell which places face the sensor in a pose; all where its place is not known."""

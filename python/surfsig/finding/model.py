@@ -128,7 +128,7 @@ def described(
 def surface_places(
     points: Array, normals: Array, voxel: float, threads: int | None
 ) -> tuple[Array, Array, float]:
-    """Give a place of each voxel, (m, 3), the normals there, (m, 3), on the side of given ones, and the noise."""
+    """Give a place of each voxel, (m, 3), normals there, (m, 3), on the side of given ones; and the noise."""
     found = extract(points, radius=NORMAL_BALL * voxel, voxel=voxel, normals=normals, threads=threads)
     known = np.isfinite(found.normals).all(axis=1)
     noise = found.noise[np.isfinite(found.noise)]

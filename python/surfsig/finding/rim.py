@@ -26,9 +26,9 @@ steep to be seen."""
 _FEWEST = 8
 """Places beside the model without which its rim says nothing."""
 _TOO_MUCH, _TOO_MUCH_OF_A_VIEW = 0.4, 0.8
-"""Share of the rim where the scene goes on, from which on the model lies in a larger surface, as a box sunk in
-a table. Of true poses of a whole model hardly any does, but a neighbour may be flush with it; a view also ends
-where something was before it, and at its holes."""
+"""Share of the rim where the scene goes on, from which on the model lies in a larger surface, as a box sunk
+in a table. Of true poses of a whole model hardly any does, but a neighbour may be flush with it; a view also
+ends where something was before it, and at its holes."""
 
 
 class Rim:

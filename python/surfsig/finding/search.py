@@ -21,7 +21,7 @@ from surfsig.finding.proposals import proposed_poses
 from surfsig.finding.scene import Scene
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences.free_directions import free_directions
-from surfsig.registration.contact import Surface, contact
+from surfsig.registration.contact import Surface, contact, spread
 from surfsig.registration.motion import shifted
 
 Array = NDArray[np.float64]
@@ -41,6 +41,8 @@ _LAST_REACHES = np.geomspace(4.0, 1.5, 8)
 """Voxels between partners, in the steps of settling."""
 _SAME_MIDDLE, _SAME_TURN = 0.25, 0.2
 """Radii of a patch, and radians, within which two poses are one."""
+_MOST_FITTED = 5000
+"""Points that a pose is fitted to at last."""
 _OWN = 1.5
 """Voxels from an instance's surface within which the scene's points are its own."""
 
@@ -51,6 +53,16 @@ class _Candidate:
     witness: Witness
     model: Model
     pose: Array
+
+    def near(self, places: Array) -> NDArray[np.bool_]:
+        """Tell which places (n, 3) of the scene are at the model's surface."""
+        local = (places - self.pose[:3, 3]) @ self.pose[:3, :3]
+        reach = _OWN * self.witness.around.voxel
+        within = np.flatnonzero(np.linalg.norm(local, axis=1) < self.model.extent + reach)
+        near = np.zeros(len(places), np.bool_)
+        distances, _ = cKDTree(self.model.places).query(local[within], distance_upper_bound=reach)
+        near[within] = np.isfinite(distances)
+        return near
 
 
 def find(
@@ -193,33 +205,39 @@ def _weighed(candidate: _Candidate) -> Evidence:
 
 
 def _instance(candidate: _Candidate, scene: Scene, taken: NDArray[np.bool_]) -> Instance | None:
-    """Fit the last steps, and take what is explained away."""
+    """Fit the scene's own points to the model's surface, and take what is explained away."""
     witness, model = candidate.witness, candidate.model
     around = witness.around
-    facing = witness.facing(candidate.pose)
-    touching = contact(
-        witness.places[facing], Surface(around.places, around.voxel), candidate.pose, around.voxel
-    )
-    if touching is None:
+    near = candidate.near(scene.points)
+    moved = spread(scene.points[near & ~taken], _MOST_FITTED)
+    fitted = contact(moved, Surface(model.points, around.voxel), _inverse(candidate.pose), around.voxel)
+    if fitted is None:
         return None
-    evidence = _weighed(replace(candidate, pose=touching.pose))
-    surface = cKDTree(model.places @ touching.pose[:3, :3].T + touching.pose[:3, 3])
-    reach = _OWN * around.voxel
+    pose = _inverse(fitted.pose)
+    better = replace(candidate, pose=pose)
+    evidence = _weighed(better)
     for part in scene.parts():
-        near, _ = surface.query(part.places, distance_upper_bound=reach)
-        part.free[np.isfinite(near)] = False
-    near, _ = surface.query(scene.points, distance_upper_bound=reach)
-    own = np.isfinite(near) & ~taken
+        part.free[better.near(part.places)] = False
+    own = better.near(scene.points) & ~taken
     taken |= own
+    # A small motion of the scene in the model's axes is the opposite one of the model in the scene's.
+    turn = np.kron(np.eye(2), pose[:3, :3])
+    center = pose[:3, :3] @ fitted.center + pose[:3, 3]
     return Instance(
         name=candidate.name,
-        T_scene_model=shifted(scene.middle) @ touching.pose @ shifted(-model.middle),
-        covariance=touching.covariance,
-        center=touching.center + scene.middle,
+        T_scene_model=shifted(scene.middle) @ pose @ shifted(-model.middle),
+        covariance=turn @ fitted.covariance @ turn.T,
+        center=center + scene.middle,
         score=evidence.score,
         visible=evidence.visible,
-        overlap=touching.overlap * float(facing.mean()),
-        rms=touching.rms,
-        free_directions=free_directions(touching.places + scene.middle, touching.normals),
+        overlap=evidence.overlap,
+        rms=fitted.rms,
+        free_directions=free_directions(
+            fitted.places @ pose[:3, :3].T + pose[:3, 3] + scene.middle, fitted.normals @ pose[:3, :3].T
+        ),
         indices=scene.numbers[own],
     )
+
+
+def _inverse(pose: Array) -> Array:
+    return np.asarray(np.linalg.inv(pose))
