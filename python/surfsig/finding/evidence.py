@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from surfsig._surfsig import SurfacePlaces
 from surfsig.finding.model import Model
@@ -58,6 +59,8 @@ class Witness:
         chosen = np.random.default_rng(0).permutation(len(model.places))[:most]
         self.places, self.normals = model.places[chosen], model.normals[chosen]
         self.surface = SurfacePlaces(self.places.astype(np.float32), self.normals.astype(np.float32))
+        self.tree = cKDTree(model.places)
+        """All places of the model."""
         self.around, self.eye, self.reach = around, eye, _REACH * model.extent
         self._rim = Rim(model, self.places, self.normals, around.voxel)
         sights = np.random.default_rng(0).normal(size=(_SIGHTS, 3))

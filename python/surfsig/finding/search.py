@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from surfsig.arguments import thread_count
@@ -34,10 +33,10 @@ _NOISES_APART = 2.5
 """Of the scene's noise, between places at least, so that equal surfaces are well within a voxel."""
 _COARSE = 2.0
 """Voxels of the first judgement, in those of the last."""
-_FEW = 600
+_FEW = 300
 """Places of the model that are looked at in the first judgement."""
-_FIRST_REACHES = np.geomspace(4.0, 1.5, 12)
-_LAST_REACHES = np.geomspace(4.0, 1.5, 8)
+_FIRST_REACHES = np.geomspace(4.0, 1.5, 8)
+_LAST_REACHES = np.geomspace(2.5, 1.5, 5)
 """Voxels between partners, in the steps of settling."""
 _SAME_MIDDLE, _SAME_TURN = 0.25, 0.2
 """Radii of a patch, and radians, within which two poses are one."""
@@ -60,7 +59,7 @@ class _Candidate:
         reach = _OWN * self.witness.around.voxel
         within = np.flatnonzero(np.linalg.norm(local, axis=1) < self.model.extent + reach)
         near = np.zeros(len(places), np.bool_)
-        distances, _ = cKDTree(self.model.places).query(local[within], distance_upper_bound=reach)
+        distances, _ = self.witness.tree.query(local[within], distance_upper_bound=reach)
         near[within] = np.isfinite(distances)
         return near
 
