@@ -34,6 +34,16 @@ def test_a_pose_and_the_moved_scan(
     np.testing.assert_allclose(read(output).points, moved(read(source).points, truth), atol=0.005)
 
 
+def test_a_page(shell: Callable[..., Any], scans: tuple[Path, Path, np.ndarray], tmp_path: Path) -> None:
+    source, target, _ = scans
+    page = tmp_path / "page.html"
+    assert shell("register", source, target, "--report", page).code == 0
+    assert "<title>a.ply in b.ply</title>" in page.read_text(encoding="utf-8")
+    wrong = shell("register", source, target, "--report", "nowhere/page.html")
+    assert (wrong.code, wrong.out) == (2, "")
+    assert "nowhere/page.html: No such file or directory" in wrong.err
+
+
 def test_a_table(shell: Callable[..., Any], scans: tuple[Path, Path, np.ndarray], tmp_path: Path) -> None:
     source, target, truth = scans
     start = tmp_path / "start.txt"

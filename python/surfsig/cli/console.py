@@ -67,8 +67,10 @@ def print_table(title: str, rows: Iterable[tuple[str, str]], *, err: bool) -> No
     """Print two columns, the first with names; in a pipe as plain lines, which are not folded."""
     if not (sys.stderr if err else sys.stdout).isatty():
         click.echo(title, err=err)
-        for name, value in rows:
-            click.echo(f"{name:<14}{value}", err=err)
+        lines = list(rows)
+        width = max([14, *(len(name) + 2 for name, _ in lines)])
+        for name, value in lines:
+            click.echo(f"{name:<{width}}{value}", err=err)
         return
     from rich.console import Console
     from rich.table import Table

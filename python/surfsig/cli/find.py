@@ -26,6 +26,9 @@ from surfsig.cli.options import CLOUD, input_options, quiet_option, threads_opti
     help="Write poses, covariances and scores as JSON; - is stdout.",
 )
 @click.option(
+    "--report", type=CLOUD, metavar="FILE.html", help="Write a page with the scene, before and after."
+)
+@click.option(
     "--score",
     type=float,
     default=defaults.INSTANCE_SCORE,
@@ -40,6 +43,7 @@ def find_command(
     library: Path | None,
     output: Path | None,
     json_file: Path | None,
+    report: Path | None,
     score: float,
     threads: int | None,
     quiet: bool,
@@ -55,6 +59,7 @@ def find_command(
     Examples:
       surfsig find cup.ply scene.pcd
       surfsig find cup.ply scene.pcd --json found.json -o labelled.ply
+      surfsig find cup.ply scene.pcd --report before_and_after.html
       surfsig find --library things.db scene.pcd
     """  # noqa: D301
     import surfsig
@@ -68,8 +73,9 @@ def find_command(
     on_stdout = json_file is not None and str(json_file) == "-"
     if output is not None:
         check_writable(output)
-    if json_file is not None and not on_stdout:
-        check_target(json_file)
+    for target in (report, None if on_stdout else json_file):
+        if target is not None:
+            check_target(target)
     model: surfsig.Library | dict[str, surfsig.PointCloud]
     if library is None:
         model = {files[0].stem: surfsig.read(files[0], **reading)}
@@ -84,6 +90,8 @@ def find_command(
     if output is not None:
         with progress_bar("writing", "points", shown=shown) as progress:
             surfsig.write(output, scene, {"instance": found.labels}, progress=progress)
+    if report is not None:
+        found.write_report(report, title=f"{found.summary()} in {scene_file.name}")
     values = {"file": str(scene_file), **found.values()}
     if on_stdout:
         print_json(values)

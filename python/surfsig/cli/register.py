@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from surfsig.cli.console import number, on_terminal, print_json, print_table, progress_bar
+from surfsig.cli.console import on_terminal, print_json, print_table, progress_bar
 from surfsig.cli.options import CLOUD, input_options, json_option, quiet_option, threads_option
-
-if TYPE_CHECKING:
-    from surfsig import Registration
 
 
 @click.command("register", no_args_is_help=True)
@@ -35,6 +32,9 @@ if TYPE_CHECKING:
     type=float,
     help="Of the patches that are matched, in the files' unit; by default from the scans.",
 )
+@click.option(
+    "--report", type=CLOUD, metavar="FILE.html", help="Write a page with both scans, before and after."
+)
 @input_options
 @threads_option
 @json_option
@@ -45,6 +45,7 @@ def register_command(
     output: Path | None,
     init: Path | None,
     radius: float | None,
+    report: Path | None,
     threads: int | None,
     as_json: bool,
     quiet: bool,
@@ -59,14 +60,18 @@ def register_command(
     Examples:
       surfsig register scan_2.ply scan_1.ply -o aligned.ply
       surfsig register a.pcd b.pcd --json > pose.json
+      surfsig register a.pcd b.pcd --report before_and_after.html
     """  # noqa: D301
     import numpy as np
 
     import surfsig
     from surfsig.files import check_writable
+    from surfsig.files.atomic import check_target
 
     if output is not None:
         check_writable(output)
+    if report is not None:
+        check_target(report)
     start = None
     if init is not None:
         try:
@@ -81,30 +86,9 @@ def register_command(
     known = bool(np.isfinite(found.T_target_source).all())
     if output is not None and known:
         surfsig.write(output, found.moved(moving))
+    if report is not None:
+        found.write_report(report, moving, still, title=f"{source.name} in {target.name}")
     if as_json:
         print_json({"source": str(source), "target": str(target)} | found.values())
         return
-    print_table(f"{source} in {target}", _rows(found, known), err=False)
-
-
-def _rows(found: Registration, known: bool) -> list[tuple[str, str]]:
-    import numpy as np
-
-    if not known:
-        return [("pose", f"none found ({found.matches} places look alike)"), ("trusted", "no")]
-    rows = [
-        ("T_target_source" if not line else "", "  ".join(f"{value: .6f}" for value in row))
-        for line, row in enumerate(found.T_target_source)
-    ]
-    deviations = np.sqrt(np.diag(found.covariance))
-    turns = ", ".join(number(value) for value in np.degrees(deviations[:3]))
-    shifts = ", ".join(number(value) for value in deviations[3:])
-    rows += [
-        ("standard deviation", f"{turns} degrees about x, y, z"),
-        ("", f"{shifts} along them, at {', '.join(number(value) for value in found.center)}"),
-        ("overlap", f"{found.overlap:.0%} of the source, rms {number(found.rms)}"),
-    ]
-    if found.matches:
-        rows.append(("matches", f"{found.inliers:,} of {found.matches:,} agree"))
-    rows += [("free", str(direction)) for direction in found.free_directions]
-    return [*rows, ("trusted", "yes" if found.trusted else "no")]
+    print_table(f"{source} in {target}", found.rows(), err=False)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from surfsig.colors import GREY, distinct_colors
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences.free_directions import FreeDirection
+from surfsig.registration.motion import moved
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,6 +80,8 @@ class Instances:
     instances: list[Instance]
     cloud: PointCloud
     """The scene."""
+    models: dict[str, PointCloud]
+    """Those that were found, by name."""
 
     def __len__(self) -> int:
         """Return the number of instances."""
@@ -104,6 +109,53 @@ class Instances:
         counts = Counter(instance.name for instance in self.instances)
         what = ", ".join(f"{count} of {name}" for name, count in sorted(counts.items()))
         return f"{len(self)} instance{'s' if len(self) > 1 else ''} ({what})"
+
+    def placed(self, number: int) -> PointCloud:
+        """Give an instance's model where it is in the scene.
+
+        Parameters
+        ----------
+        number
+            The instance's.
+
+        Returns
+        -------
+        The model's finite points, in the scene's coordinates.
+        """
+        instance = self.instances[number]
+        return moved(self.models[instance.name], instance.T_scene_model)
+
+    def write_report(self, path: str | Path, *, title: str = "Instances") -> None:
+        """Write one HTML page: the scene before, and after with the models in colours, and a table.
+
+        The page needs no network. Of many points 60,000 are drawn.
+
+        Parameters
+        ----------
+        path
+            Where to write.
+        title
+            The page's.
+
+        Raises
+        ------
+        InvalidInputError
+            If Plotly is not installed (`pip install surfsig[report]`).
+        """
+        from surfsig.page import Group, write_page
+
+        header, rows = self.table()
+        points, labels = self.cloud.points, self.labels
+        groups = [Group("scene", points[labels < 0], GREY)]
+        if len(self):
+            groups.append(Group("what is found", points[labels >= 0], GREY, state="before"))
+        for number, color in enumerate(distinct_colors(len(self)).tolist()):
+            words = [f"{what}: {value}" for what, value in zip(header[2:], rows[number][2:], strict=True)]
+            name = f"{number} {self.instances[number].name}"
+            both = np.concatenate([points[labels == number], self.placed(number).points])
+            groups.append(Group(name, both, color, number, words, state="after"))
+        text = f"{self.summary()}. A click on a point or a row shows the instance."
+        write_page(path, title, text, groups, header, rows)
 
     def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Describe the instances for people.

@@ -110,7 +110,7 @@ def find(
     cloud = PointCloud.of(scene)
     models = _models(model, threads)
     if int(cloud.finite.sum()) < FEWEST or not models:
-        return Instances([], cloud)
+        return Instances([], cloud, {})
     candidates: list[_Candidate] = []
     prepared = Scene(cloud, min(part.radius for part in models.values()), threads)
     eye = prepared.eye() if prepared.sided else None
@@ -183,6 +183,7 @@ def _different(poses: Array, radius: float) -> list[Array]:
 def _accepted(candidates: list[_Candidate], scene: Scene, least: float) -> Instances:
     """Take the best candidate and its part of the scene away, until none is good enough."""
     instances: list[Instance] = []
+    models: dict[str, PointCloud] = {}
     taken = np.zeros(len(scene.points), np.bool_)
     while candidates:
         scores = np.array([_weighed(candidate).score for candidate in candidates])
@@ -193,9 +194,10 @@ def _accepted(candidates: list[_Candidate], scene: Scene, least: float) -> Insta
         found = _instance(best, scene, taken)
         if found is not None and found.score >= least:
             instances.append(found)
+            models[best.name] = PointCloud(best.model.points, best.model.middle)
         candidates = [candidates[number] for number in kept if candidates[number] is not best]
     instances.sort(key=lambda instance: -instance.score)
-    return Instances(instances, scene.given)
+    return Instances(instances, scene.given, models)
 
 
 def _weighed(candidate: _Candidate) -> Evidence:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from surfsig.recurrences.free_directions import FreeDirection
 from surfsig.registration.motion import moved
 
 Array = NDArray[np.float64]
+
+_BLUE, _ORANGE = (31, 119, 180), (255, 127, 14)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,6 +92,67 @@ class Registration:
         A cloud of its own, with all fields.
         """
         return moved(cloud, self.T_target_source)
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Describe the result for people.
+
+        Returns
+        -------
+        Names and values: the pose, standard deviations, overlap, matches, free directions, trusted.
+        """
+        if not np.isfinite(self.T_target_source).all():
+            return [("pose", f"none found ({self.matches} places look alike)"), ("trusted", "no")]
+        rows = [
+            ("T_target_source" if not line else "", "  ".join(f"{value: .6f}" for value in row))
+            for line, row in enumerate(self.T_target_source)
+        ]
+        deviations = np.sqrt(np.diag(self.covariance))
+        turns, shifts, center = (
+            ", ".join(f"{value:.6g}" for value in values)
+            for values in (np.degrees(deviations[:3]), deviations[3:], self.center)
+        )
+        rows += [
+            ("standard deviation", f"{turns} degrees about x, y, z"),
+            ("", f"{shifts} along them, at {center}"),
+            ("overlap", f"{self.overlap:.0%} of the source, rms {self.rms:.6g}"),
+        ]
+        if self.matches:
+            rows.append(("matches", f"{self.inliers:,} of {self.matches:,} agree"))
+        rows += [("free", str(direction)) for direction in self.free_directions]
+        return [*rows, ("trusted", "yes" if self.trusted else "no")]
+
+    def write_report(
+        self, path: str | Path, source: PointCloud, target: PointCloud, *, title: str = "Registration"
+    ) -> None:
+        """Write one HTML page: both clouds before and after, in a view that turns, and what was found.
+
+        The page needs no network. Of many points 60,000 are drawn.
+
+        Parameters
+        ----------
+        path
+            Where to write.
+        source, target
+            The clouds that were registered.
+        title
+            The page's.
+
+        Raises
+        ------
+        InvalidInputError
+            If Plotly is not installed (`pip install surfsig[report]`).
+        """
+        from surfsig.page import Group, write_page
+
+        moving, still = "source", "target"
+        groups = [
+            Group(still, target.points, _BLUE),
+            Group(moving, source.points, _ORANGE, state="before"),
+            Group(moving, self.apply(source.points), _ORANGE, state="after"),
+        ]
+        trusted = "trusted" if self.trusted else "not trusted"
+        text = f"The source before and after it was moved into the target: {trusted}."
+        write_page(path, title, text, groups, ("", ""), self.rows())
 
     def values(self) -> dict[str, Any]:
         """Give everything as plain numbers, for JSON; None for what is not known.

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig import _surfsig
+from surfsig.colors import GREY, distinct_colors
 from surfsig.point_cloud import PointCloud
 from surfsig.surfaces.classes import PointClass, classify
-from surfsig.surfaces.colors import NO_SURFACE, surface_colors
 from surfsig.surfaces.surface import Surface
 from surfsig.surfaces.wording import HEADER, table_rows
 
@@ -121,7 +121,7 @@ class Surfaces:
     @property
     def colors(self) -> NDArray[np.uint8]:
         """A colour for each point, (n, 3): red, green and blue of its surface, grey for none."""
-        return np.concatenate([surface_colors(len(self)), [NO_SURFACE]]).astype(np.uint8)[self.labels]
+        return np.concatenate([distinct_colors(len(self)), [GREY]]).astype(np.uint8)[self.labels]
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Name what is known of each point, as files call it.
@@ -184,12 +184,9 @@ class Surfaces:
         InvalidInputError
             If Plotly is not installed (`pip install surfsig[report]`).
         """
-        from surfsig.files.atomic import replacing
-        from surfsig.surfaces.report import page
+        from surfsig.surfaces.report import write_report
 
-        text = page(self, title)
-        with replacing(Path(path)) as file:
-            file.write(text.encode())
+        write_report(self, path, title)
 
     def _why_none(self) -> str:
         finite = int(self.cloud.finite.sum())

@@ -1,59 +1,26 @@
-"""One self-contained page about the surfaces of a scan, by Plotly (`pip install surfsig[report]`)."""
+"""One self-contained page about the surfaces of a scan."""
 
 from __future__ import annotations
 
-import html
-import math
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from surfsig.convert.libraries import library
-from surfsig.surfaces.colors import NO_SURFACE, surface_colors
+from surfsig.colors import GREY, distinct_colors
+from surfsig.page import Group, write_page
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from surfsig.surfaces.found import Surfaces
 
-DRAWN = 60_000
-"""Points that are drawn; of more, evenly chosen ones."""
 
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; margin: 1.5rem auto; max-width: 75rem; padding: 0 1rem; }
-h1 { font-size: 1.4rem; margin: 0; }
-.view { height: 70vh; min-height: 25rem; }
-table { border-collapse: collapse; width: 100%; }
-th, td { text-align: right; padding: 0.2rem 0.6rem; border-bottom: 1px solid #ddd; }
-th { position: sticky; top: 0; background: #fff; }
-td:nth-child(2), th:nth-child(2), td:nth-child(5), th:nth-child(5) { text-align: left; }
-tbody tr { cursor: pointer; }
-tr.chosen { background: #ffeeb0; }
-i { display: inline-block; width: 0.8em; height: 0.8em; border-radius: 50%; }
-"""
-
-# A click on a point or a row marks the row and makes the surface's points larger. It comes behind the table.
-_SCRIPT = """
-const view = document.getElementById('view');
-const rows = document.querySelectorAll('#surfaces tbody tr');
-function choose(number, scroll) {
-  rows.forEach((row, i) => row.classList.toggle('chosen', i === number));
-  if (scroll && rows[number]) rows[number].scrollIntoView({block: 'nearest', behavior: 'smooth'});
-  const sizes = view.data.map(trace => trace.meta === number ? 4 : 1.6);
-  Plotly.restyle(view, {'marker.size': sizes});
-}
-view.on('plotly_click', event => choose(event.points[0].data.meta, true));
-rows.forEach((row, i) => row.addEventListener('click', () => choose(i, false)));
-"""
-
-
-def page(found: Surfaces, title: str) -> str:
-    """Make the page.
+def write_report(found: Surfaces, path: str | Path, title: str) -> None:
+    """Write the points coloured by surface, and the table of the surfaces.
 
     Parameters
     ----------
     found
         The surfaces.
+    path
+        Where to write.
     title
         The page's.
 
@@ -62,84 +29,20 @@ def page(found: Surfaces, title: str) -> str:
     InvalidInputError
         If Plotly is not installed.
     """
-    library("plotly", "Plotly", "surfsig[report]")
-    view = _figure(found).to_html(
-        full_html=False,
-        include_plotlyjs=True,
-        div_id="view",
-        config={"responsive": True},
-    )
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8">'
-        f"<title>{html.escape(title)}</title><style>{_STYLE}</style></head>\n<body>\n"
-        f"<h1>{html.escape(title)}</h1>\n<p>{html.escape(found.summary())}. Lengths are in the scan's unit; "
-        f"a click on a point or a row shows the surface.</p>\n"
-        f'<div class="view">{view}</div>\n{_table(found)}\n<script>{_SCRIPT}</script>\n</body>\n</html>\n'
-    )
-
-
-def _figure(found: Surfaces) -> Any:
-    import plotly.graph_objects as go
-
-    finite = np.flatnonzero(found.cloud.finite)
-    shown = finite[:: max(1, math.ceil(len(finite) / DRAWN))]
-    points = found.cloud.offsets[shown] + found.cloud.origin
-    origin = _origin(points)
-    places = (points - origin).astype(np.float32)
-    labels = found.labels[shown]
-    colors = [*surface_colors(len(found)).tolist(), NO_SURFACE]
+    points, labels = found.cloud.points, found.labels
     header, rows = found.table()
-    traces = []
-    for number, color in enumerate(colors):
-        row = rows[number] if number < len(rows) else None
-        members = labels == (number if row else -1)
-        name = f"{row[0]} {row[1]}" if row else "no surface"
-        words = (
-            [f"{what}: {value}" for what, value in zip(header[2:], row[2:], strict=True) if value]
-            if row
-            else []
+    groups = [
+        Group(
+            f"{row[0]} {row[1]}",
+            points[labels == number],
+            color,
+            number,
+            [f"{what}: {value}" for what, value in zip(header[2:], row[2:], strict=True) if value],
         )
-        traces.append(_trace(go, places[members], number if row else -1, name, words, color))
-    titles = [f"{letter} - {at:.15g}" if at else letter for letter, at in zip("xyz", origin, strict=True)]
-    axes = {f"{letter}axis": {"title": {"text": text}} for letter, text in zip("xyz", titles, strict=True)}
-    figure = go.Figure(traces)
-    figure.update_layout(
-        scene={"aspectmode": "data", "camera": {"eye": {"x": 1.4, "y": 1.4, "z": 1.1}}, **axes},
-        margin={"l": 0, "r": 0, "t": 0, "b": 0},
-        # Below the buttons.
-        legend={"itemsizing": "constant", "y": 0.93},
+        for number, (row, color) in enumerate(zip(rows, distinct_colors(len(found)).tolist(), strict=True))
+    ]
+    groups.append(Group("no surface", points[labels < 0], GREY))
+    text = (
+        f"{found.summary()}. Lengths are in the scan's unit; a click on a point or a row shows the surface."
     )
-    return figure
-
-
-def _origin(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give a round place near points that are far from 0, for the browser has float32 only; else 0."""
-    extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
-    middle = points.mean(axis=0) if len(points) else np.zeros(3)
-    if not extent > 0:
-        return middle
-    step = 10.0 ** math.floor(math.log10(extent))
-    origin: NDArray[np.float64] = np.where(np.abs(middle) > 100 * extent, np.round(middle / step) * step, 0.0)
-    return origin
-
-
-def _trace(go: Any, places: NDArray[np.float32], number: int, name: str, words: list[str], color: Any) -> Any:
-    where = dict(zip("xyz", places.T, strict=True))
-    marker = {"size": 1.6, "color": "rgb({},{},{})".format(*color)}
-    hover = "<br>".join([f"<b>{name}</b>", *words]) + "<extra></extra>"
-    return go.Scatter3d(**where, mode="markers", name=name, meta=number, marker=marker, hovertemplate=hover)
-
-
-def _table(found: Surfaces) -> str:
-    header, rows = found.table()
-    head = "".join(f"<th>{html.escape(word)}</th>" for word in header)
-    body = []
-    for color, (number, *words) in zip(surface_colors(len(found)).tolist(), rows, strict=True):
-        mark = '<i style="background:rgb({},{},{})"></i>'.format(*color)
-        cells = "".join(f"<td>{html.escape(word)}</td>" for word in words)
-        body.append(f"<tr><td>{mark} {number}</td>{cells}</tr>")
-    return (
-        f'<table id="surfaces"><thead><tr>{head}</tr></thead>\n<tbody>\n'
-        + "\n".join(body)
-        + "\n</tbody></table>"
-    )
+    write_page(path, title, text, groups, header, rows)

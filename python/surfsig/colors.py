@@ -1,4 +1,4 @@
-"""Colours that tell surfaces apart."""
+"""Colours that tell things apart."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-NO_SURFACE = (150, 150, 150)
-"""Grey, for points of no surface."""
+GREY = (150, 150, 150)
+"""For points of none of them."""
 
 _GOLDEN = (math.sqrt(5) - 1) / 2
 """Of the circle of hues: no two of many such steps come close."""
 
 
-def surface_colors(count: int) -> NDArray[np.uint8]:
+def distinct_colors(count: int) -> NDArray[np.uint8]:
     """Give so many distinct colours.
 
     Parameters
