@@ -1,24 +1,54 @@
-"""Instances found in simulated scenes of five half hidden copies, and in scenes without any.
+"""Instances found in simulated scenes and in real ones, and where there is none.
 
-python benchmarks/finding.py
+python benchmarks/finding.py --write
 """
 
 from __future__ import annotations
 
 import argparse
+import datetime
+import os
+import sys
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
-from finding_scene import OBJECTS, FindingScene, finding_scene, whole
+from descriptor_pairs import read_pairs
+from finding_scene import NOISE, OBJECTS, FindingScene, finding_scene, whole
+from machine import describe_machine, own_versions
 from numpy.typing import NDArray
+from peers import ROOT
+from report import Results, Row, markdown_table, measured_on, update_section
+from rich.progress import track
 
 import surfsig
 
 Array = NDArray[np.float64]
 
+COMMAND = "python benchmarks/finding.py --write"
 SHIFT, TURN = 0.005, 2.0
 """Errors of a pose that is right, at most: metres, degrees."""
+SIMULATED = (
+    "object",
+    "noise, mm",
+    "scenes",
+    "right",
+    "false",
+    "largest errors of right",
+    "false without a copy",
+    "seconds, median",
+)
+REAL = ("model", "scene", "found", "score", "off its true pose", "seconds")
+TRUTHS = {"milk": "T_scene_from_milk_DERIVED.txt", "chef": "T_rs1_from_chef_DERIVED.txt"}
+EMPTY = (
+    "registration/redkitchen/cloud_bin_0.ply",
+    "labelled_tables/learn0.pcd",
+    "surfaces/table_scene_mug.pcd",
+)
+"""Scenes that have none of the real objects."""
+BUNNY = 1.5
+"""Size of the bunny that is looked for there, so that it is as large as the others."""
 
 
 @dataclass(frozen=True)
@@ -55,28 +85,96 @@ def scored(scene: FindingScene, found: surfsig.Instances) -> Score:
     return Score(len(scene.poses) - len(left), false, max(shifts), max(turns))
 
 
+def simulated_row(name: str, noise: float, seeds: list[int]) -> Row:
+    """Look for five copies, and for one where there is none."""
+    model = whole(name)
+    scores, wrong, seconds = [], 0, []
+    for seed in track(seeds, description=f"{name}, {noise * 1000:g} mm", transient=True):
+        for copies in (5, 0):
+            scene = finding_scene(name, seed, copies=copies, noise=noise)
+            start = time.perf_counter()
+            found = surfsig.find(model, scene.cloud)
+            seconds.append(time.perf_counter() - start)
+            if copies:
+                scores.append(scored(scene, found))
+            else:
+                wrong += len(found)
+    shift, turn = max(score.shift for score in scores), max(score.turn for score in scores)
+    return (
+        name, f"{noise * 1000:g}", f"{len(seeds)}",
+        f"{sum(score.right for score in scores)} of {5 * len(seeds)}",
+        f"{sum(score.false for score in scores)}", f"{shift * 1000:.2f} mm, {turn:.2f} degrees", f"{wrong}",
+        f"{np.median(seconds):.1f}",
+    )  # fmt: skip
+
+
+def real_rows(data: Path) -> list[Row]:
+    """Look for real objects in scenes that hold them, and in others."""
+    models, rows = {}, []
+    for name, truth in TRUTHS.items():
+        folder = data / "objects" / name
+        models[name] = surfsig.read(folder / f"{name}.pcd")
+        scene = surfsig.read(folder / "scene.pcd")
+        rows.append(real_row(name, models[name], f"{name}'s", scene, np.loadtxt(folder / truth)))
+    views = {pairs.title.split(",")[0]: pairs for pairs in read_pairs(data)}["bunny"]
+    for (a, b), motion in views.motions.items():
+        one, other = (surfsig.PointCloud(views.scans[i].points, viewpoint=np.zeros(3)) for i in (a, b))
+        rows.append(real_row(a, one, b, other, motion))
+        rows.append(real_row(b, other, a, one, np.asarray(np.linalg.inv(motion), np.float64)))
+    models["bunny"] = surfsig.PointCloud(BUNNY * views.scans["bun000"].points)
+    for path in EMPTY:
+        scene = surfsig.read(data / path)
+        rows += [real_row(name, model, path.split("/")[-1], scene, None) for name, model in models.items()]
+    return rows
+
+
+def real_row(
+    name: str, model: surfsig.PointCloud, where: str, scene: surfsig.PointCloud, truth: Array | None
+) -> Row:
+    """Look for one object in one scene; the true pose is None where it is not there."""
+    start = time.perf_counter()
+    found = surfsig.find(model, scene)
+    seconds = time.perf_counter() - start
+    middle = np.eye(4)
+    middle[:3, 3] = np.median(model.points[model.finite], axis=0)
+    off = "-"
+    if truth is not None and len(found):
+        shift, turn = errors(found[0].T_scene_model @ middle, truth @ middle)
+        off = f"{shift * 1000:.2f} mm, {turn:.2f} degrees"
+    scores = " ".join(f"{instance.score:.2f}" for instance in found.instances) or "-"
+    count = f"{len(found)}" if truth is not None else f"{len(found)}, and none is there"
+    return name, where, count, scores, off, f"{seconds:.1f}"
+
+
 def main() -> None:
-    """Run the scenes, and print a line for each."""
+    """Measure, print and write."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
+    default = Path(os.environ.get("SURFSIG_TEST_DATA", ROOT / ".." / "shared" / "data"))
+    parser.add_argument("data", type=Path, nargs="?", default=default, help="folder of the real scans")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4, 5, 6])
     parser.add_argument("--objects", choices=list(OBJECTS), nargs="+", default=list(OBJECTS))
-    options = parser.parse_args()
-    for name in options.objects:
-        model = whole(name)
-        for seed in options.seeds:
-            for copies in (5, 0):
-                scene = finding_scene(name, seed, copies=copies)
-                start = time.perf_counter()
-                found = surfsig.find(model, scene.cloud)
-                taken = time.perf_counter() - start
-                score = scored(scene, found)
-                hidden = " ".join(f"{share:.2f}" for share in scene.hidden) or "-"
-                print(
-                    f"{name}, seed {seed}: {score.right} of {copies} found, {score.false} false; largest "
-                    f"errors {score.shift * 1000:.2f} mm, {score.turn:.2f} degrees; hidden {hidden}; "
-                    f"scores {' '.join(f'{i.score:.2f}' for i in found.instances) or '-'}; {taken:.1f} s",
-                    flush=True,
-                )
+    parser.add_argument("--noise", type=float, nargs="+", default=[NOISE, 5 * NOISE], help="metres")
+    parser.add_argument("--write", action="store_true", help="update BENCHMARKS.md")
+    arguments = parser.parse_args()
+    results: Results = {
+        "machine": describe_machine(),
+        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
+        "versions": own_versions(),
+    }
+    rows = [
+        simulated_row(name, noise, arguments.seeds) for name in arguments.objects for noise in arguments.noise
+    ]
+    parts = [markdown_table(SIMULATED, rows)]
+    if arguments.data.is_dir():
+        parts.append(markdown_table(REAL, real_rows(arguments.data)))
+    notes = [*measured_on(results), f"Seeds of the scenes: {', '.join(map(str, arguments.seeds))}."]
+    text = "\n\n".join([*parts, "\n".join(f"- {line}" for line in notes)])
+    print(text)
+    if arguments.write:
+        try:
+            update_section(ROOT / "BENCHMARKS.md", COMMAND, text)
+        except (OSError, ValueError) as error:
+            sys.exit(f"BENCHMARKS.md is not updated: {error}")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +55,7 @@ class FindingScene:
     hidden: Array
 
 
+@cache
 def whole(name: str, points: int = 12_000) -> surfsig.PointCloud:
     """Give an object's whole surface, without normals: what rays from all around meet first."""
     rng = np.random.default_rng(0)
@@ -64,7 +66,10 @@ def whole(name: str, points: int = 12_000) -> surfsig.PointCloud:
     return surfsig.PointCloud(hits[np.isfinite(hits[:, 0])][:points])
 
 
-def finding_scene(name: str, seed: int, *, copies: int = 5, others: int = 4) -> FindingScene:
+@cache
+def finding_scene(
+    name: str, seed: int, *, copies: int = 5, others: int = 4, noise: float = NOISE
+) -> FindingScene:
     """Place copies and other objects, hide half of what is seen of each copy, and take a depth image.
 
     Parameters
@@ -75,6 +80,8 @@ def finding_scene(name: str, seed: int, *, copies: int = 5, others: int = 4) -> 
         Of places, turns, kinds and noise.
     copies, others
         How many; up to 12 together.
+    noise
+        Standard deviation of distances, in metres.
     """
     rng = np.random.default_rng(seed)
     back = simulate.pose((0.0, 0.0, TABLE), simulate.facing(simulate.UP))
@@ -95,9 +102,9 @@ def finding_scene(name: str, seed: int, *, copies: int = 5, others: int = 4) -> 
     scene = simulate.Scene([*placed, *boards])
     hits = scene.cast(np.zeros_like(ways), ways)
     seen = np.array([*owner, *[-1] * copies])[hits.surface]
-    noise = rng.normal(0.0, NOISE, (len(ways), 1))
+    off = rng.normal(0.0, noise, (len(ways), 1))
     cloud = surfsig.PointCloud(
-        (hits.points + noise * ways).astype(np.float32), viewpoint=np.zeros(3), grid=(HEIGHT, WIDTH)
+        (hits.points + off * ways).astype(np.float32), viewpoint=np.zeros(3), grid=(HEIGHT, WIDTH)
     )
     hidden = [1.0 - (seen == number).sum() / (bare == number).sum() for number in range(copies)]
     return FindingScene(cloud, np.array(poses[:copies]).reshape(-1, 4, 4), np.array(hidden))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from finding import errors, scored
 from finding_scene import finding_scene, whole
+from scipy.spatial.transform import Rotation
 
 import surfsig
 from surfsig.finding.visible_from import seen_from
@@ -74,6 +75,37 @@ def test_real_objects_are_not_found_in_each_others_scene(shared_data: Path) -> N
     for name, other in (("milk", "chef"), ("chef", "milk")):
         model = surfsig.read(objects / name / f"{name}.pcd")
         assert len(surfsig.find(model, surfsig.read(objects / other / "scene.pcd"))) == 0
+
+
+def test_clutter_is_no_model(shared_data: Path) -> None:
+    room = surfsig.read(shared_data / "registration" / "redkitchen" / "cloud_bin_0.ply")
+    assert len(surfsig.find(surfsig.PointCloud(3.0 * whole("figure").points), room)) == 0
+
+
+def test_a_box_is_no_bracket() -> None:
+    # Where the bracket's faces end, those of a larger box go on.
+    scene = finding_scene("bracket with pin", 3, copies=0, others=9)
+    assert len(surfsig.find(whole("bracket with pin"), scene.cloud)) == 0
+
+
+def test_poses_from_noisy_scans_are_as_sure_as_they_say() -> None:
+    scene = finding_scene("figure", 1, copies=3, others=0, noise=1e-3)
+    found = surfsig.find(whole("figure"), scene.cloud)
+    assert scored(scene, found).right == len(found) == 3
+    for instance in found.instances:
+        true = min(scene.poses, key=lambda pose: errors(instance.T_scene_model, pose))
+        turn = Rotation.from_matrix(true[:3, :3] @ instance.T_scene_model[:3, :3].T).as_rotvec()
+        way = (true @ np.linalg.inv(instance.T_scene_model) @ [*instance.center, 1.0])[:3] - instance.center
+        motion = np.concatenate([turn, way])
+        # Beyond 22.5 are a thousandth of all, if the errors are normal.
+        assert motion @ np.linalg.solve(instance.covariance, motion) < 22.5
+
+
+def test_any_number_of_threads_finds_the_same(five: surfsig.Instances) -> None:
+    alone = surfsig.find(whole("figure"), finding_scene("figure", 1).cloud, threads=1)
+    for one, other in zip(alone.instances, five.instances, strict=True):
+        assert one.score == other.score
+        np.testing.assert_array_equal(one.T_scene_model, other.T_scene_model)
 
 
 def test_far_away_coordinates_change_nothing() -> None:

@@ -80,10 +80,11 @@ def test_the_commands_do_all_of_it(tmp_path: Path, shell: Any) -> None:
     again = shell("library", "add", store, "figure", model)
     assert (again.code, again.err.count("\n")) == (2, 1)
     assert "figure" in shell("library", "list", store).out
-    labelled, values = tmp_path / "labelled.ply", tmp_path / "found.json"
-    found = shell("find", "--library", store, scan, "--json", values, "-o", labelled)
+    labelled, values, page = (tmp_path / name for name in ("labelled.ply", "found.json", "page.html"))
+    found = shell("find", "--library", store, scan, "--json", values, "-o", labelled, "--report", page)
     assert found.code == 0
     assert "1 instance (1 of figure)" in found.out
+    assert "1 instance (1 of figure) in scene.ply" in page.read_text(encoding="utf-8")
     import json
 
     (instance,) = json.loads(values.read_text())["instances"]
