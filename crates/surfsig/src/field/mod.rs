@@ -4,10 +4,12 @@
 //! large-scale normal ([`patch`]), as angular Fourier sums, and seen in a learned frame ([`frame`]). Magnitudes do
 //! not change when the patch is turned about its axis; the phases tell by how much it was turned.
 
+mod distinctiveness;
 mod frame;
 mod patch;
 mod support;
 
+pub use distinctiveness::field_distinctiveness;
 pub use frame::{FIELD_PHASES, FIELD_SIGNATURE, FieldPhases};
 
 use crate::simd::InstructionSet;
