@@ -99,8 +99,8 @@ def register(
     voxel = size / _VOXELS
     refiner = Refiner(ours.offsets, theirs.offsets, voxel)
     pose = refiner.refined(pose)
-    places = spread(ours.offsets, min(refiner.source_voxels, _PLACES))
-    surface = Surface(spread(theirs.offsets, refiner.target_voxels), voxel)
+    places = spread(ours.offsets, min(refiner.source_voxels, _PLACES), threads)
+    surface = Surface(spread(theirs.offsets, refiner.target_voxels, threads), voxel, threads)
     found = contact(places, surface, pose, voxel)
     if found is None:
         return _nothing(size, 0 if pairs is None else len(pairs))
