@@ -49,7 +49,8 @@ pub fn field_distinctiveness(
     };
     let counted = LIKE.min(vectors.len());
     let unlike = |largest: &Largest| {
-        let distances = largest[LIKE - counted..].iter().map(|&product| (2.0 - 2.0 * product).max(0.0).sqrt());
+        let distances =
+            largest[LIKE - counted..].iter().map(|&product| (2.0 - 2.0 * product).max(0.0).sqrt());
         distances.sum::<f32>() / counted as f32
     };
     with_threads(threads, || {
@@ -118,7 +119,8 @@ mod tests {
             for i in 0..count {
                 let mut distances: Vec<f64> = (0..count)
                     .map(|j| {
-                        let apart = (0..3).map(|a| (places[i][a] - places[j][a]).powi(2)).sum::<f64>() >= 0.25;
+                        let apart =
+                            (0..3).map(|a| (places[i][a] - places[j][a]).powi(2)).sum::<f64>() >= 0.25;
                         let product = vectors[i].iter().zip(&vectors[j]).map(|(a, b)| a * b).sum::<f32>();
                         if apart { (2.0 - 2.0 * f64::from(product)).max(0.0).sqrt() } else { 2.0 }
                     })

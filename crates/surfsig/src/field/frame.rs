@@ -73,7 +73,9 @@ impl FieldFrame {
             for (first, block) in (0..).step_by(ATOMS).zip(&atoms.blocks) {
                 let count = ATOMS.min(atoms.count - first);
                 project(set, pools, order, block, &mut coefficients);
-                for (([real, imaginary], &scale), signature) in coefficients.iter().zip(&scales).zip(&mut found) {
+                for (([real, imaginary], &scale), signature) in
+                    coefficients.iter().zip(&scales).zip(&mut found)
+                {
                     let vector = &mut signature.vector[filled..filled + count];
                     if order == 0 {
                         let offsets = &self.offsets[first..first + count];

@@ -143,7 +143,8 @@ impl Pooling {
             if !members.is_empty() {
                 let (ring, level) = (cell / HEIGHTS, cell % HEIGHTS);
                 let (ring_above, level_above) = ((ring + 1).min(RINGS - 1), (level + 1).min(HEIGHTS - 1));
-                let corners = [(ring, level), (ring, level_above), (ring_above, level), (ring_above, level_above)];
+                let corners =
+                    [(ring, level), (ring, level_above), (ring_above, level), (ring_above, level_above)];
                 for (corner, (ring, level)) in corners.into_iter().enumerate() {
                     let bin = ring * HEIGHTS + level;
                     pool.occupied |= 1 << bin;
@@ -264,8 +265,8 @@ fn share_out_in(members: &[Members], [x, y, z]: &[[f32; 3]; 3], shares: &mut [Sh
     }
 }
 
-/// Gives each member its own, by blocks of four. A function of its own: for AVX-512 the compiler would scatter single
-/// numbers, which takes three times as long.
+/// Gives each member its own. A function of its own: for AVX-512 the compiler would scatter single numbers, which takes
+/// three times as long.
 #[inline(never)]
 fn hand_out(
     waves: &[[f32; LANES]; WAVES],
@@ -274,29 +275,17 @@ fn hand_out(
     cells: &[u32; LANES],
     shares: &mut [Share],
 ) {
-    for (block, shares) in shares.chunks_exact_mut(4).enumerate() {
-        let first = 4 * block;
-        for w in (0..WAVES).step_by(4) {
-            for (l, share) in shares.iter_mut().enumerate() {
-                let lane = first + l;
-                share.waves[w..w + 4].copy_from_slice(&[
-                    waves[w][lane],
-                    waves[w + 1][lane],
-                    waves[w + 2][lane],
-                    waves[w + 3][lane],
-                ]);
-            }
+    for (l, share) in shares.iter_mut().enumerate() {
+        for w in 0..WAVES {
+            share.waves[w] = waves[w][l];
         }
-        for (l, share) in shares.iter_mut().enumerate() {
-            let lane = first + l;
-            for q in 0..QUANTITIES {
-                share.quantities[q] = quantities[q][lane];
-            }
-            for corner in 0..4 {
-                share.weights[corner] = weights[corner][lane];
-            }
-            share.cell = cells[lane];
+        for q in 0..QUANTITIES {
+            share.quantities[q] = quantities[q][l];
         }
+        for corner in 0..4 {
+            share.weights[corner] = weights[corner][l];
+        }
+        share.cell = cells[l];
     }
 }
 
