@@ -150,11 +150,6 @@ def _knows_its_side(cloud: PointCloud) -> bool:
     return viewpoint is not None or normals is not None
 
 
-def _extent(cloud: PointCloud) -> float:
-    """Give the median distance from the median."""
-    return float(np.median(np.linalg.norm(cloud.offsets, axis=1))) if len(cloud) else 0.0
-
-
 def _pose(init: ArrayLike) -> Array:
     """Check a pose that somebody gives."""
     try:

@@ -1,88 +1,7 @@
-//! The two kernels of field signatures: members of a ball pooled into harmonics, and harmonics seen in a frame.
+//! Members of a ball pooled into harmonics.
 
-use super::{InstructionSet, for_each_instruction_set};
-
-/// Rings of the cylindrical grid, from the axis to the ball's radius.
-pub(crate) const RINGS: usize = 5;
-/// Heights of the grid, over the ball's diameter.
-pub(crate) const HEIGHTS: usize = 6;
-/// What is pooled: the normal along the axis, outwards and around; the bend; its difference between the two
-/// principal directions, and that times cosine and sine of twice the angle to the outward direction.
-pub(crate) const QUANTITIES: usize = 7;
-/// Angular Fourier orders, 0 included.
-pub(crate) const ORDERS: usize = 8;
-/// Cosines of all orders, then sines.
-pub(crate) const WAVES: usize = 2 * ORDERS;
-/// Numbers that each order has: one complex number per bin and quantity.
-pub(crate) const FEATURES: usize = RINGS * HEIGHTS * QUANTITIES;
-const _: () = assert!(FEATURES.is_multiple_of(2));
-
-/// What is known at a point of the surface.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Curved {
-    pub normal: [f32; 3],
-    /// Along k1.
-    pub direction: [f32; 3],
-    /// Of the mean curvature, between -1 and 1.
-    pub bend: f32,
-    /// Of half the difference between the principal curvatures, between 0 and 1.
-    pub difference: f32,
-}
-
-/// Members of a ball that are worked with side by side.
-pub(crate) const LANES: usize = 16;
-
-/// Some members of a ball: their places from its centre in units of its radius, and what they are. Zeros stand beyond
-/// the last.
-#[derive(Clone, Copy)]
-#[repr(align(64))]
-pub(crate) struct Members {
-    pub place: [[f32; LANES]; 3],
-    pub normal: [[f32; LANES]; 3],
-    pub direction: [[f32; LANES]; 3],
-    pub bend: [f32; LANES],
-    pub difference: [f32; LANES],
-}
-
-impl Members {
-    pub const NONE: Self = Self {
-        place: [[0.0; LANES]; 3],
-        normal: [[0.0; LANES]; 3],
-        direction: [[0.0; LANES]; 3],
-        bend: [0.0; LANES],
-        difference: [0.0; LANES],
-    };
-
-    /// Says what one of them is.
-    pub fn set(&mut self, lane: usize, member: &Curved) {
-        for axis in 0..3 {
-            self.normal[axis][lane] = member.normal[axis];
-            self.direction[axis][lane] = member.direction[axis];
-        }
-        self.bend[lane] = member.bend;
-        self.difference[lane] = member.difference;
-    }
-}
-
-const BINS: usize = RINGS * HEIGHTS;
-
-/// Sums of waves over the members of a ball, for each bin (ring by ring, in each by height) and quantity.
-#[derive(Clone)]
-#[repr(align(64))]
-pub(crate) struct Pool {
-    bins: [[[f32; WAVES]; QUANTITIES]; BINS],
-    /// Bins that members share, a bit for each; all others are zero.
-    occupied: u32,
-}
-
-impl Pool {
-    pub const ZERO: Self = Self { bins: [[[0.0; WAVES]; QUANTITIES]; BINS], occupied: 0 };
-
-    /// The waves of each feature.
-    pub fn features(&self) -> &[[f32; WAVES]; FEATURES] {
-        self.bins.as_flattened().try_into().expect("as many as there are")
-    }
-}
+use super::{BINS, HEIGHTS, LANES, Members, ORDERS, Pool, QUANTITIES, RINGS, WAVES};
+use crate::simd::{InstructionSet, for_each_instruction_set};
 
 /// What a member adds to the four bins around it.
 #[derive(Clone, Copy)]
@@ -317,92 +236,10 @@ fn add_waves(sums: &mut [f32; WAVES], factor: f32, waves: &[f32; WAVES]) {
     }
 }
 
-/// Atoms of one order that are worked with at a time.
-pub(crate) const ATOMS: usize = 16;
-
-/// For each feature, real and imaginary parts of some atoms.
-pub(crate) type AtomBlock = [[[f32; ATOMS]; 2]; FEATURES];
-
-/// Real and imaginary parts of the products of a pool's features of one order with some atoms.
-pub(crate) type Coefficients = [[f32; ATOMS]; 2];
-
-for_each_instruction_set! {
-    /// The coefficients of each pool.
-    pub(crate) fn project(pools: &[Pool], order: usize, atoms: &AtomBlock, found: &mut [Coefficients]) {
-        plain: project_in::<1>,
-        wide: project_in::<2>,
-        widest: project_in::<8>,
-    }
-}
-
-/// `TOGETHER` pools at a time, so that atoms are fetched once for them: as many as there are registers for.
-#[inline(always)]
-fn project_in<const TOGETHER: usize>(
-    pools: &[Pool],
-    order: usize,
-    atoms: &AtomBlock,
-    found: &mut [Coefficients],
-) {
-    assert!(order < ORDERS);
-    for (pools, found) in pools.chunks(TOGETHER).zip(found.chunks_mut(TOGETHER)) {
-        let mut together = [&pools[0]; TOGETHER];
-        let mut occupied = 0;
-        for (t, pool) in pools.iter().enumerate() {
-            together[t] = pool;
-            occupied |= pool.occupied;
-        }
-        let mut sums = [[[0.0_f32; ATOMS]; 2]; TOGETHER];
-        for bin in 0..BINS {
-            if (occupied >> bin) & 1 == 0 {
-                continue;
-            }
-            for q in 0..QUANTITIES {
-                let [re, im] = &atoms[bin * QUANTITIES + q];
-                for t in 0..TOGETHER {
-                    let waves = &together[t].bins[bin][q];
-                    let (c, s) = (waves[order], waves[ORDERS + order]);
-                    let [real, imaginary] = &mut sums[t];
-                    for l in 0..ATOMS {
-                        real[l] = s.mul_add(-im[l], c.mul_add(re[l], real[l]));
-                        imaginary[l] = s.mul_add(re[l], c.mul_add(im[l], imaginary[l]));
-                    }
-                }
-            }
-        }
-        for (t, coefficients) in found.iter_mut().enumerate() {
-            *coefficients = sums[t];
-        }
-    }
-}
-
-for_each_instruction_set! {
-    /// The length of a pool as a vector.
-    pub(crate) fn length(pool: &Pool) -> f64 {
-        plain: length_in,
-        wide: length_in,
-        widest: length_in,
-    }
-}
-
-#[inline(always)]
-fn length_in(pool: &Pool) -> f64 {
-    let mut sums = [0.0_f64; WAVES];
-    for feature in pool.features() {
-        for w in 0..WAVES {
-            let value = f64::from(feature[w]);
-            sums[w] = value.mul_add(value, sums[w]);
-        }
-    }
-    let mut sum = 0.0;
-    for w in 0..WAVES {
-        sum += sums[w];
-    }
-    sum.sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::field::Curved;
 
     #[test]
     fn every_set_gives_the_same_bits_and_the_sums_are_those_of_angles() {
@@ -442,27 +279,6 @@ mod tests {
                 .sum();
             let sum: f32 = pools[0].bins.iter().map(|bin| bin[0][order]).sum();
             assert!((sum - expected).abs() < 1e-3, "{order}: {sum} {expected}");
-        }
-        let atoms: AtomBlock =
-            std::array::from_fn(|f| [0, 1].map(|k| std::array::from_fn(|l| number(f, k + l))));
-        // More than go together in any set, and not a multiple of it.
-        let mut several = vec![pools[0].clone(); 11];
-        for (factor, pool) in (1_u8..).zip(&mut several) {
-            pool.bins.as_flattened_mut().iter_mut().flatten().for_each(|sum| *sum *= f32::from(factor));
-        }
-        let projected = |set| {
-            let mut found = [[[0.0; ATOMS]; 2]; 11];
-            project(set, &several, 3, &atoms, &mut found);
-            (found, several.iter().map(|pool| length(set, pool)).collect::<Vec<_>>())
-        };
-        let plain = projected(InstructionSet::available()[0]);
-        for set in InstructionSet::available() {
-            assert_eq!(projected(set), plain, "{}", set.name());
-        }
-        let products = pools[0].features().iter().zip(&atoms);
-        let expected: f32 = products.map(|(f, [re, im])| f[3] * re[2] - f[ORDERS + 3] * im[2]).sum();
-        for (factor, found) in (1_u8..).zip(plain.0) {
-            assert!((found[0][2] / f32::from(factor) - expected).abs() < 1e-3, "{factor}");
         }
     }
 }
