@@ -1,7 +1,7 @@
 //! Harmonics seen in a frame.
 
 use super::{BINS, FEATURES, ORDERS, Pool, QUANTITIES, WAVES};
-use crate::simd::{InstructionSet, for_each_instruction_set};
+use crate::simd::for_each_instruction_set;
 
 /// Atoms of one order that are worked with at a time.
 pub(crate) const ATOMS: usize = 16;
@@ -89,6 +89,7 @@ fn length_in(pool: &Pool) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::InstructionSet;
 
     #[test]
     fn every_set_gives_the_same_bits_and_the_products_of_features_and_atoms() {
