@@ -1,10 +1,10 @@
-"""How many nearest neighbours among descriptors are right, surfsig's beside FPFH, and how long they take.
+"""How many nearest neighbours among descriptors are right, beside FPFH and SHOT, and how long they take.
 
 python benchmarks/descriptors.py --write
 
 Random points of each scan are described, and each is matched with the most similar one of the other scan; a
-match is right where the true motion carries the one to within the tolerance of the other. FPFH gets surfsig's
-normals, and several radii.
+match is right where the true motion carries the one to within the tolerance of the other. FPFH and SHOT get
+surfsig's normals, and several radii.
 """
 
 from __future__ import annotations
@@ -15,25 +15,31 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from descriptor_objects import read_objects, simulated_objects
 from descriptor_pairs import Array, Scan, ScanPairs, read_pairs
 from machine import describe_machine, own_versions
 from numpy.typing import NDArray
-from peers import HERE, ROOT, PeerUnavailable, peer_python, run_json
+from peers import HERE, ROOT, PeerUnavailable, peer_python, run_json, shot_program
 from report import Results, Row, markdown_table, measured_on, update_section
 from timing import times_of
 
 import surfsig
 
+COMMAND = "python benchmarks/descriptors.py --write"
 COLUMNS = ("descriptor", "right", "right, mutual", "mutual matches")
 SPEED_COLUMNS = ("cloud", "points", "in a ball", "FPFH, ms a point", "surfsig, ms a point", "ratio")
 SHARES = (0.7, 1.0)
-"""Radii of FPFH, in units of surfsig's."""
+"""Radii of the peers, in units of surfsig's."""
 
 SPACING = 0.05
-"""FPFH's clouds are thinned to this, in units of surfsig's radius; with all points it takes an hour."""
+"""The peers' clouds are thinned to this, in units of surfsig's radius; with all points FPFH takes an hour."""
+
+SHOT = 352
+"""Numbers of a SHOT."""
 
 NORMALS = 0.16
 """Radius in which normals are fitted, in units of surfsig's."""
@@ -87,30 +93,49 @@ def run_fpfh(clouds: list[Path], radius: float) -> tuple[list[NDArray[np.float32
     return [np.load(path.with_suffix(".npy")) for path in clouds], answer["processor_seconds"]
 
 
-def fpfh(pairs: ScanPairs, share: float, folder: Path) -> Vectors:
-    """FPFH with a radius of this share of ours."""
+def write_clouds(pairs: ScanPairs, folder: Path) -> list[Path]:
+    """Write all scans for the peers."""
     paths = []
     for name, scan in pairs.scans.items():
         paths.append(folder / f"{name}.npz")
         support = surfsig.extract(scan.points, pairs.radius * NORMALS, voxel=pairs.radius * SPACING).indices
         assert support is not None
         write_cloud(paths[-1], scan, support, pairs.radius * NORMALS)
-    histograms, _ = run_fpfh(paths, pairs.radius * share)
+    return paths
+
+
+def fpfh(pairs: ScanPairs, share: float, folder: Path) -> Vectors:
+    """FPFH with a radius of this share of ours."""
+    histograms, _ = run_fpfh(write_clouds(pairs, folder), pairs.radius * share)
     return dict(zip(pairs.scans, histograms, strict=True))
 
 
+def shot(pairs: ScanPairs, share: float, folder: Path) -> Vectors:
+    """SHOT with a radius of this share of ours; places without one get zeros, like nothing else."""
+    program, vectors = shot_program(), {}
+    for name, path in zip(pairs.scans, write_clouds(pairs, folder), strict=True):
+        arrays = np.load(path)
+        cloud, answers = path.with_suffix(".f32"), path.with_suffix(".shot")
+        np.hstack([arrays["points"], arrays["normals"]]).astype("<f4").tofile(cloud)
+        command = [*program, str(pairs.radius * share), cloud, str(arrays["count"]), answers]
+        run_json(command, threads=os.cpu_count() or 1)
+        vectors[name] = np.nan_to_num(np.fromfile(answers, "<f4").reshape(-1, SHOT))
+    return vectors
+
+
 def quality_rows(pairs: ScanPairs, folder: Path) -> list[Row]:
-    """Return a row for surfsig, and one for each radius of the peer."""
+    """Return a row for surfsig, and one for each peer and radius."""
     methods: list[tuple[str, Callable[[], Vectors]]] = [
         (f"surfsig, radius {pairs.radius:g}", lambda: ours(pairs))
     ]
-    for share in SHARES:
-        label = f"FPFH (Open3D), radius {pairs.radius * share:g}"
-        methods.append((label, lambda share=share: fpfh(pairs, share, folder)))  # type: ignore[misc]
+    for peer, describe in (("FPFH (Open3D)", fpfh), ("SHOT (PCL)", shot)):
+        for share in SHARES:
+            label = f"{peer}, radius {pairs.radius * share:g}"
+            methods.append((label, partial(describe, pairs, share, folder)))
     rows: list[Row] = []
-    for label, describe in methods:
+    for label, vectors_of in methods:
         try:
-            right, mutual, count = score(pairs, describe())
+            right, mutual, count = score(pairs, vectors_of())
         except PeerUnavailable as reason:
             rows.append((label, f"not measured: {reason}", "", ""))
         else:
@@ -169,17 +194,20 @@ def main() -> None:
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
         "versions": own_versions(),
     }
-    try:
-        results["versions"] |= run_json(
-            [peer_python("open3d"), HERE / "descriptors_open3d.py", "versions"], threads=1
-        )
-    except PeerUnavailable as reason:
-        print(f"Open3D is left out: {reason}", file=sys.stderr)
+    for peer, command in (
+        ("Open3D", lambda: [peer_python("open3d"), HERE / "descriptors_open3d.py"]),
+        ("PCL", shot_program),
+    ):
+        try:
+            results["versions"] |= run_json([*command(), "versions"], threads=1)
+        except PeerUnavailable as reason:
+            print(f"{peer} is left out: {reason}", file=sys.stderr)
     parts = []
     with tempfile.TemporaryDirectory() as name:
-        for pairs in every:
+        for pairs in [*every, *read_objects(arguments.data), simulated_objects()]:
             print(pairs.title, file=sys.stderr, flush=True)
-            parts.append(f"### {pairs.title[0].upper()}{pairs.title[1:]}: {len(pairs.motions)} pairs")
+            unit = "pair" if len(pairs.motions) == 1 else "pairs"
+            parts.append(f"### {pairs.title[0].upper()}{pairs.title[1:]}: {len(pairs.motions)} {unit}")
             parts.append(markdown_table(COLUMNS, quality_rows(pairs, Path(name))))
         parts.append("### Processor time, all points of a cloud")
         parts.append(markdown_table(SPEED_COLUMNS, speed_rows(every, Path(name))))
@@ -187,9 +215,8 @@ def main() -> None:
     text = "\n\n".join(parts)
     print(text)
     if arguments.write:
-        command = "python benchmarks/descriptors.py --write"
         try:
-            update_section(ROOT / "BENCHMARKS.md", command, text)
+            update_section(ROOT / "BENCHMARKS.md", COMMAND, text)
         except (OSError, ValueError) as error:
             sys.exit(f"BENCHMARKS.md is not updated: {error}")
 

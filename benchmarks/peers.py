@@ -22,6 +22,7 @@ ROOT = HERE.parent
 ENVIRONMENT = ROOT / ".venv-peers"
 BUILD = ROOT / "build" / "benchmarks"
 TIME_LIMIT_SECONDS = 1800
+PCL_LIBRARIES = tuple(f"-lpcl_{part}" for part in ("features", "search", "kdtree", "octree", "common"))
 CGAL_LIBRARIES = ("-lgmp", "-lmpfr")
 
 # Folders that hold the headers of a package, where pkg-config does not say.
@@ -164,8 +165,19 @@ def cpp_program() -> Command:
     PeerUnavailable
         When the compiler or the headers are missing, or it does not compile.
     """
-    libraries = [f"-lpcl_{part}" for part in ("features", "search", "kdtree", "octree", "common")]
-    return compiled(HERE / "peers_pcl_cgal.cpp", include_flags("pcl_features"), [*libraries, *CGAL_LIBRARIES])
+    libraries = [*PCL_LIBRARIES, *CGAL_LIBRARIES]
+    return compiled(HERE / "peers_pcl_cgal.cpp", include_flags("pcl_features"), libraries)
+
+
+def shot_program() -> Command:
+    """Return the command of the program that computes PCL's SHOT, compiled where needed.
+
+    Raises
+    ------
+    PeerUnavailable
+        When the compiler or the headers are missing, or it does not compile.
+    """
+    return compiled(HERE / "shot_pcl.cpp", include_flags("pcl_features"), PCL_LIBRARIES)
 
 
 def jets_program() -> Command:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 import surfsig
-from surfsig import InvalidInputError
+from surfsig import InvalidInputError, _surfsig
 from surfsig.field.keypoints import _apart, _spread
 
 Array = NDArray[np.float64]
@@ -104,3 +104,17 @@ def test_count_and_spacing_exclude_each_other() -> None:
         surfsig.keypoints(scan(), RADIUS, count=3, spacing=0.1)
     with pytest.raises(InvalidInputError, match="count must be"):
         surfsig.keypoints(scan(), RADIUS, count=0)
+
+
+def test_places_near_each_other_do_not_make_each_other_common() -> None:
+    found = surfsig.keypoints(scan(), RADIUS, count=60, viewpoint=VIEW)
+    vectors, places = found.vectors, found.points.astype(np.float64)
+    given = _surfsig.field_distinctiveness(vectors, places, radius=RADIUS, threads=1)
+    apart = np.linalg.norm(places[:, None] - places, axis=2) >= RADIUS
+    between = np.where(apart, np.linalg.norm(vectors[:, None] - vectors, axis=2), 2.0)
+    np.testing.assert_allclose(given, np.sort(between, axis=1)[:, :5].mean(axis=1), atol=1e-4)
+    np.testing.assert_array_equal(
+        given, _surfsig.field_distinctiveness(vectors, places, radius=RADIUS, threads=3)
+    )
+    with pytest.raises(InvalidInputError, match="60 vectors for 59 places"):
+        _surfsig.field_distinctiveness(vectors, places[:59], radius=RADIUS)

@@ -21,6 +21,7 @@ __all__ = [
     "SurfacePlaces",
     "__version__",
     "extract",
+    "field_distinctiveness",
     "field_signatures",
     "find_surfaces",
     "fit_primitive",
@@ -63,6 +64,13 @@ def field_signatures(
     progress: Callable[[int, int], object] | None = None,
     pools: bool = False,
 ) -> dict[str, NDArray[Any]]: ...
+def field_distinctiveness(
+    vectors: NDArray[np.float32],
+    places: NDArray[np.float64],
+    *,
+    radius: float,
+    threads: int | None = None,
+) -> NDArray[np.float32]: ...
 def find_surfaces(
     points: NDArray[np.floating],
     *,

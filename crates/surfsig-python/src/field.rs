@@ -1,7 +1,7 @@
 //! Field signatures, for Python.
 
 use crate::extract::{At, Points, watched};
-use crate::{rows, to_python};
+use crate::{invalid_input, rows, to_python};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -65,6 +65,28 @@ pub fn field_signatures<'py>(
     }
     report()?;
     Ok(arrays)
+}
+
+/// How unlike each place is to the others; see `surfsig.keypoints`.
+#[pyfunction]
+#[pyo3(signature = (vectors, places, *, radius, threads=None))]
+pub fn field_distinctiveness<'py>(
+    py: Python<'py>,
+    vectors: PyReadonlyArray2<'py, f32>,
+    places: PyReadonlyArray2<'py, f64>,
+    radius: f64,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    let (vectors, places) = (rows::<f32, FIELD_SIGNATURE>(&vectors)?, rows::<f64, 3>(&places)?);
+    if vectors.len() != places.len() {
+        return Err(invalid_input(&format!("{} vectors for {} places", vectors.len(), places.len())));
+    }
+    let radius = Radius::new(radius).map_err(to_python)?;
+    let monitor = Monitor::default();
+    let run = || surfsig::field_distinctiveness(vectors, places, radius, threads, &monitor);
+    let found =
+        py.detach(|| watched(run, || Python::attach(|py| py.check_signals()), || monitor.cancel()))?;
+    Ok(found.into_pyarray(py))
 }
 
 /// As many rows as there are places.

@@ -59,7 +59,7 @@ mod _surfsig {
     #[pymodule_export]
     use crate::extract::{extract, voxel_representatives};
     #[pymodule_export]
-    use crate::field::field_signatures;
+    use crate::field::{field_distinctiveness, field_signatures};
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]

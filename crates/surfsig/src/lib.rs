@@ -61,8 +61,8 @@ pub use extract::{
     extract_monitored, extract_radii, voxel_representatives,
 };
 pub use field::{
-    FIELD_PHASES, FIELD_SIGNATURE, FieldOptions, FieldPatches, FieldPhases, FieldSignature, field_pools,
-    field_signatures,
+    FIELD_PHASES, FIELD_SIGNATURE, FieldOptions, FieldPatches, FieldPhases, FieldSignature,
+    field_distinctiveness, field_pools, field_signatures,
 };
 pub use fit::{
     Cylinder, FitAxes, FitKind, FitUsed, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere,

@@ -6,15 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from surfsig.arguments import positive_length, whole_number
+from surfsig import _surfsig
+from surfsig.arguments import positive_length, thread_count, whole_number
 from surfsig.defaults import KEYPOINT_CANDIDATES, KEYPOINTS
 from surfsig.errors import InvalidInputError
 from surfsig.field.signatures import FieldSignatures, field_signatures
 from surfsig.point_cloud import PointCloud
 
 _MOST = 2**32 - 1
-_LIKE = 5
-_BLOCK = 1024
 _NEIGHBOURS = 64
 
 
@@ -67,24 +66,20 @@ def keypoints(
     if not len(found):
         return found
     places = found.points - found.points.mean(axis=0)
-    order = np.argsort(-_distinctiveness(found, places), kind="stable")
+    order = np.argsort(-_distinctiveness(found, places, threads), kind="stable")
     if apart is not None:
         return found.take(order[_apart(places[order], apart)])
     order = order[: max(most, len(order) // 3)]
     return found.take(order[_spread(places[order])[:most]])
 
 
-def _distinctiveness(found: FieldSignatures, places: NDArray[np.floating]) -> NDArray[np.float64]:
+def _distinctiveness(
+    found: FieldSignatures, places: NDArray[np.floating], threads: int | None
+) -> NDArray[np.float64]:
     """Distance to the signatures most like each, times the share of a full patch that is there, (m,)."""
-    unlike = np.zeros(len(found))
-    for start in range(0, len(found), _BLOCK):
-        block = slice(start, start + _BLOCK)
-        like = found.vectors[block] @ found.vectors.T
-        square = np.sum(places[block] ** 2, axis=1)[:, None] + np.sum(places**2, axis=1)
-        like[square - 2.0 * places[block] @ places.T < found.radius**2] = -1.0
-        number = min(_LIKE, like.shape[1])
-        nearest = np.partition(like, like.shape[1] - number, axis=1)[:, -number:]
-        unlike[block] = np.sqrt(np.maximum(2.0 - 2.0 * nearest, 0.0)).mean(axis=1)
+    unlike = _surfsig.field_distinctiveness(
+        found.vectors, places.astype(np.float64), radius=found.radius, threads=thread_count(threads)
+    )
     full = np.median(found.count)
     return np.asarray(unlike * np.minimum(found.count / full, 1.0))
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -57,19 +58,21 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class _Heights:
+    """Of the k places that are where the target has a surface."""
+
+    which: NDArray[np.int64]
+    """Their numbers, (k,)."""
     height: Array
     normal: Array
-    there: NDArray[np.bool_]
-    """Where the target has a surface."""
     numbers: NDArray[np.int64]
-    """The target's places that tell it, (n, k)."""
+    """The target's places that tell the height, (k, 20)."""
     weights: Array
-    """What each adds to the height, per its own height, (n, k)."""
+    """What each adds to the height, per its own height, (k, 20)."""
     noise: Array
-    """Variance of these about the surface, (n,)."""
+    """Variance of these about the surface, (k,)."""
 
 
-def spread(points: Array, count: int) -> Array:
+def spread(points: Array, count: int, threads: int | None) -> Array:
     """Choose so many points, spread evenly over a surface however dense its parts are.
 
     Each by chance (always the same), with a probability of the area around it. Of voxels, one with its upper
@@ -80,7 +83,8 @@ def spread(points: Array, count: int) -> Array:
         points = points[np.sort(draws.choice(len(points), _MOST_DRAWN * count, replace=False))]
     if len(points) <= count:
         return points
-    distances, _ = cKDTree(points).query(points, k=min(_AROUND, len(points)))
+    around = min(_AROUND, len(points))
+    distances, _ = cKDTree(points).query(points, k=around, workers=_workers(threads))
     # A key of u^(1 / weight), the largest ones: Efraimidis and Spirakis, Weighted random sampling (2006).
     area = distances[:, -1] ** 2
     area = np.maximum(area, _SMALLEST * area.max()) if area.max() > 0.0 else np.ones(len(points))
@@ -88,43 +92,54 @@ def spread(points: Array, count: int) -> Array:
     return np.asarray(points[np.sort(np.argpartition(-keys, count - 1)[:count])])
 
 
+def _workers(threads: int | None) -> int:
+    """Give SciPy's word for a number of threads."""
+    return -1 if threads is None else threads
+
+
 class Surface:
     """The target's points, whose surface is a paraboloid through the nearest ones."""
 
-    def __init__(self, points: Array, voxel: float) -> None:
+    def __init__(self, points: Array, voxel: float, threads: int | None = 1) -> None:
         self.points, self.tree, self.voxel = points, cKDTree(points), voxel
+        self.workers = _workers(threads)
 
     def heights(self, places: Array) -> _Heights:
         """Measure how high places (n, 3) are above the surface, along its normal there."""
         count = min(_NEIGHBOURS, len(self.points))
-        distances, numbers = self.tree.query(places, k=count)
+        distances, numbers = self.tree.query(places, k=count, workers=self.workers)
         around = self.points[numbers] - places[:, None]
         middle = around.mean(axis=1)
-        spread = around - middle[:, None]
-        values, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", spread, spread) / count)
+        apart = around - middle[:, None]
+        values, axes = np.linalg.eigh(apart.transpose(0, 2, 1) @ apart / count)
         size = np.sqrt(np.maximum(values, 0.0))
-        # z = f + d x + e y + (a x^2 + 2 b x y + c y^2) / 2 in axes along the points' spread.
-        local = np.einsum("nki,nij->nkj", around, axes[:, :, ::-1])
-        scale = np.maximum(size[:, 2], 1e-300)[:, None]
-        x, y, z = (local[..., axis] / scale for axis in range(3))
-        design = np.stack([np.ones_like(x), x, y, 0.5 * x * x, x * y, 0.5 * y * y], axis=2)
-        normal_matrix = np.einsum("nki,nkj->nij", design, design) + 1e-9 * np.eye(6)
-        share = np.linalg.solve(normal_matrix, design.transpose(0, 2, 1))
-        fit = np.einsum("nik,nk->ni", share, z)
-        left = z - np.einsum("nki,ni->nk", design, fit)
-        slope = fit[:, 1:3]
-        steep = 1.0 / np.sqrt(1.0 + (slope**2).sum(axis=1))
-        # The place is at 0: the surface is f above it, measured along the normal.
-        height = -fit[:, 0] * scale[:, 0] * steep
-        tilted = np.einsum("nij,nj->ni", axes[:, :, ::-1], np.column_stack([-slope, np.ones(len(places))]))
         inside = np.linalg.norm(np.einsum("ni,nij->nj", middle, axes[:, :, 1:]), axis=1) < _INSIDE * (
             size[:, 1] + size[:, 2]
         )
         near = distances[:, 0] < _REACH * self.voxel
         thin = size[:, 0] < _THICK * size[:, 1]
-        noise = (left**2).sum(axis=1) * (scale[:, 0] * steep) ** 2 / max(count - 6, 1)
-        weights = -share[:, 0] * steep[:, None]
-        return _Heights(height, tilted * steep[:, None], near & inside & thin, numbers, weights, noise)
+        which = np.flatnonzero(near & inside & thin)
+        # z = f + d x + e y + (a x^2 + 2 b x y + c y^2) / 2 in axes along the points' spread.
+        axes = axes[which][:, :, ::-1]
+        scale = np.maximum(size[which, 2], 1e-300)
+        x, y, z = np.moveaxis(around[which] @ axes / scale[:, None, None], 2, 0)
+        design = np.stack([np.ones_like(x), x, y, 0.5 * x * x, x * y, 0.5 * y * y], axis=2)
+        transposed = design.transpose(0, 2, 1)
+        # The coefficients, and what f takes from each neighbour's height.
+        right = np.zeros((len(which), 6, 2))
+        right[:, :, :1] = transposed @ z[:, :, None]
+        right[:, 0, 1] = 1.0
+        solved = np.linalg.solve(transposed @ design + 1e-9 * np.eye(6), right)
+        fitted, share = np.moveaxis(design @ solved, 2, 0)
+        slope = solved[:, 1:3, 0]
+        steep = 1.0 / np.sqrt(1.0 + (slope**2).sum(axis=1))
+        # The place is at 0: the surface is f above it, measured along the normal.
+        height = -solved[:, 0, 0] * scale * steep
+        tilted = np.einsum("nij,nj->ni", axes, np.column_stack([-slope, np.ones(len(which))]))
+        noise = ((z - fitted) ** 2).sum(axis=1) * (scale * steep) ** 2 / max(count - 6, 1)
+        return _Heights(
+            which, height, tilted * steep[:, None], numbers[which], -share * steep[:, None], noise
+        )
 
 
 def contact(source: Array, surface: Surface, pose: Array, voxel: float) -> Contact | None:
@@ -144,13 +159,13 @@ def contact(source: Array, surface: Surface, pose: Array, voxel: float) -> Conta
     for step in range(_STEPS + 1):
         moved = source @ pose[:3, :3].T + pose[:3, 3]
         found = surface.heights(moved)
-        if found.there.sum() < 12:
+        if len(found.which) < 12:
             return None
-        strays = 1.4826 * float(np.median(np.abs(found.height[found.there])))
+        strays = 1.4826 * float(np.median(np.abs(found.height)))
         # Where the target's own points stray more than elsewhere, there is an edge.
-        smooth = found.noise <= _LARGE * np.median(found.noise[found.there])
-        on = found.there & smooth & (np.abs(found.height) < _STRAY * max(strays, _FLOOR * voxel))
-        places, normals, heights = moved[on], found.normal[on], found.height[on]
+        smooth = found.noise <= _LARGE * np.median(found.noise)
+        on = smooth & (np.abs(found.height) < _STRAY * max(strays, _FLOOR * voxel))
+        places, normals, heights = moved[found.which[on]], found.normal[on], found.height[on]
         center = places.mean(axis=0)
         unit = float(np.sqrt(((places - center) ** 2).sum(axis=1).mean())) or 1.0
         design = np.hstack([np.cross((places - center) / unit, normals), normals])
@@ -187,9 +202,9 @@ def _independent(design: Array, heights: Array, found: _Heights, on: NDArray[np.
     of_target = float(found.noise[on].mean())
     of_source = max(float((heights**2).mean()) - of_target * float((weights**2).sum(axis=1).mean()), 0.0)
     parts = design[:, None, :] * design[:, 3:, None]
-    together = np.zeros((int(numbers.max()) + 1, 18))
-    np.add.at(together, numbers.ravel(), (weights[:, :, None] * parts.reshape(-1, 1, 18)).reshape(-1, 18))
-    together = together.reshape(-1, 6)
+    rows = np.repeat(np.arange(len(numbers)), numbers.shape[1])
+    of_place = coo_array((weights.ravel(), (numbers.ravel(), rows))).tocsr()
+    together = (of_place @ parts.reshape(-1, 18)).reshape(-1, 6)
     inverse = np.linalg.pinv(design.T @ design, rcond=1e-12, hermitian=True)
     middle = of_source * design.T @ design + of_target * together.T @ together
     return np.asarray(inverse @ middle @ inverse)

@@ -99,8 +99,8 @@ def register(
     voxel = size / _VOXELS
     refiner = Refiner(ours.offsets, theirs.offsets, voxel)
     pose = refiner.refined(pose)
-    places = spread(ours.offsets, min(refiner.source_voxels, _PLACES))
-    surface = Surface(spread(theirs.offsets, refiner.target_voxels), voxel)
+    places = spread(ours.offsets, min(refiner.source_voxels, _PLACES), threads)
+    surface = Surface(spread(theirs.offsets, refiner.target_voxels, threads), voxel, threads)
     found = contact(places, surface, pose, voxel)
     if found is None:
         return _nothing(size, 0 if pairs is None else len(pairs))
@@ -148,11 +148,6 @@ def _matched(source: PointCloud, target: PointCloud, radius: float, count: int, 
 def _knows_its_side(cloud: PointCloud) -> bool:
     viewpoint, normals = orientation(cloud, None, None, np.arange(0))
     return viewpoint is not None or normals is not None
-
-
-def _extent(cloud: PointCloud) -> float:
-    """Give the median distance from the median."""
-    return float(np.median(np.linalg.norm(cloud.offsets, axis=1))) if len(cloud) else 0.0
 
 
 def _pose(init: ArrayLike) -> Array:

@@ -2,7 +2,7 @@
 
 use super::FieldSignature;
 use crate::simd::InstructionSet;
-use crate::simd::field::{ATOMS, AtomBlock, FEATURES, ORDERS, Pool, project};
+use crate::simd::field::{ATOMS, AtomBlock, FEATURES, ORDERS, Pool, length, project};
 use std::sync::OnceLock;
 
 /// Numbers of a field signature.
@@ -10,6 +10,7 @@ pub const FIELD_SIGNATURE: usize = 256;
 
 /// Of each order from 1 on, atoms whose coefficients are kept with their phases: the clearest.
 pub const FIELD_PHASES: usize = 8;
+const _: () = assert!(FIELD_PHASES <= ATOMS, "all are in the first block");
 
 /// Coefficients of one place: for each order from 1 on, real and imaginary parts.
 pub type FieldPhases = [[[f32; 2]; FIELD_PHASES]; ORDERS - 1];
@@ -65,23 +66,31 @@ impl FieldFrame {
     /// Some at a time, so that atoms are fetched once for all.
     pub fn signatures(&self, set: InstructionSet, pools: &[Pool]) -> Vec<Option<FieldSignature>> {
         let mut found = vec![FieldSignature::of(0.0); pools.len()];
-        let size = |pool: &Pool| {
-            pool.features().iter().flatten().map(|&sum| f64::from(sum).powi(2)).sum::<f64>().sqrt()
-        };
-        let sizes: Vec<f64> = pools.iter().map(size).collect();
+        let scales: Vec<f32> = pools.iter().map(|pool| (1.0 / length(set, pool)) as f32).collect();
+        let mut coefficients = vec![[[0.0; ATOMS]; 2]; pools.len()];
         let mut filled = 0;
         for (order, atoms) in self.orders.iter().enumerate() {
             for (first, block) in (0..).step_by(ATOMS).zip(&atoms.blocks) {
                 let count = ATOMS.min(atoms.count - first);
-                for ((pool, size), signature) in pools.iter().zip(&sizes).zip(&mut found) {
-                    let [real, imaginary] = project(set, pool, order, block);
-                    for l in 0..count {
-                        let [re, im] = [real[l], imaginary[l]].map(|part| (f64::from(part) / size) as f32);
-                        let atom = first + l;
-                        signature.vector[filled + l] =
-                            if order == 0 { re - self.offsets[atom] } else { im.mul_add(im, re * re).sqrt() };
-                        if order > 0 && atom < FIELD_PHASES {
-                            signature.phases[order - 1][atom] = [re, im];
+                project(set, pools, order, block, &mut coefficients);
+                for (([real, imaginary], &scale), signature) in
+                    coefficients.iter().zip(&scales).zip(&mut found)
+                {
+                    let vector = &mut signature.vector[filled..filled + count];
+                    if order == 0 {
+                        let offsets = &self.offsets[first..first + count];
+                        for (l, (value, offset)) in vector.iter_mut().zip(offsets).enumerate() {
+                            *value = real[l] * scale - offset;
+                        }
+                        continue;
+                    }
+                    for (l, value) in vector.iter_mut().enumerate() {
+                        let (re, im) = (real[l] * scale, imaginary[l] * scale);
+                        *value = (re * re + im * im).sqrt();
+                    }
+                    if first == 0 {
+                        for (l, phases) in signature.phases[order - 1].iter_mut().enumerate() {
+                            *phases = [real[l] * scale, imaginary[l] * scale];
                         }
                     }
                 }

@@ -4,10 +4,12 @@
 //! large-scale normal ([`patch`]), as angular Fourier sums, and seen in a learned frame ([`frame`]). Magnitudes do
 //! not change when the patch is turned about its axis; the phases tell by how much it was turned.
 
+mod distinctiveness;
 mod frame;
 mod patch;
 mod support;
 
+pub use distinctiveness::field_distinctiveness;
 pub use frame::{FIELD_PHASES, FIELD_SIGNATURE, FieldPhases};
 
 use crate::simd::InstructionSet;
@@ -68,10 +70,17 @@ impl FieldSignature {
 
     /// The same with a vector of length 1; `None` where it has no length.
     fn of_unit_length(mut self) -> Option<Self> {
-        let length = self.vector.iter().map(|&value| f64::from(value).powi(2)).sum::<f64>().sqrt();
-        let unit = |value: &mut f32| *value = (f64::from(*value) / length) as f32;
-        self.vector.iter_mut().for_each(unit);
-        self.phases.iter_mut().flatten().flatten().for_each(unit);
+        // Several sums that do not wait for each other.
+        let mut squares = [0.0_f64; 8];
+        for values in self.vector.chunks_exact(squares.len()) {
+            for (sum, &value) in squares.iter_mut().zip(values) {
+                *sum += f64::from(value) * f64::from(value);
+            }
+        }
+        let length = squares.iter().sum::<f64>().sqrt();
+        let scale = (1.0 / length) as f32;
+        self.vector.iter_mut().for_each(|value| *value *= scale);
+        self.phases.as_flattened_mut().as_flattened_mut().iter_mut().for_each(|value| *value *= scale);
         (length.is_finite() && length > 0.0).then_some(self)
     }
 }

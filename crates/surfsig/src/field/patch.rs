@@ -6,7 +6,7 @@ use crate::ball::{BallVisitor, DirectWalk};
 use crate::cell_index::CellIndex;
 use crate::extract::{Extraction, extract_within};
 use crate::simd::InstructionSet;
-use crate::simd::field::{Curved, Pool, pool};
+use crate::simd::field::{Curved, LANES, Members, Pool, Pooling, along};
 use crate::simd::select::Block;
 use crate::{Error, ExtractOptions, Monitor, PointCloud, Queries, Radius, Status};
 use rayon::prelude::*;
@@ -25,10 +25,11 @@ const ROWS: usize = 4;
 
 /// Collects the members of a ball.
 struct Patch<'a> {
-    index: &'a CellIndex,
+    /// By their ranks in the index.
     curved: &'a [Curved],
-    places: Vec<[f32; 3]>,
-    members: Vec<Curved>,
+    members: Vec<Members>,
+    count: usize,
+    pooling: Pooling,
     /// Of the patches that wait to be made into values, and the numbers of their entries.
     pools: Vec<Pool>,
     waiting: Vec<usize>,
@@ -38,20 +39,24 @@ impl BallVisitor for Patch<'_> {
     const WANTS_RANKS: bool = true;
 
     fn visit(&mut self, block: &Block, len: usize) {
-        self.places.extend((0..len).map(|i| [block.x[i], block.y[i], block.z[i]]));
-        let point = |&rank: &u32| self.curved[self.index.point_of_rank[rank as usize] as usize];
-        self.members.extend(block.rank[..len].iter().map(point));
+        for start in (0..len).step_by(LANES) {
+            self.members.push(Members::NONE);
+            let members = self.members.last_mut().expect("just added");
+            for (axis, coordinates) in [&block.x, &block.y, &block.z].into_iter().enumerate() {
+                members.place[axis].copy_from_slice(&coordinates[start..start + LANES]);
+            }
+            for (lane, &rank) in block.rank[start..len.min(start + LANES)].iter().enumerate() {
+                members.set(lane, &self.curved[rank as usize]);
+            }
+        }
+        self.count += len;
     }
 }
 
 impl Patch<'_> {
     /// The fitted normal, turned to the side of the members' normals near the place.
-    fn axis(&self, fitted: [f32; 3]) -> [f32; 3] {
-        let square = |[x, y, z]: [f32; 3]| z.mul_add(z, y.mul_add(y, x * x));
-        let near =
-            self.places.iter().zip(&self.members).filter(|(p, _)| square(**p) < AXIS_SHARE * AXIS_SHARE);
-        let along = |(_, member): (_, &Curved)| (0..3).map(|a| member.normal[a] * fitted[a]).sum::<f32>();
-        if near.map(along).sum::<f32>() < 0.0 { fitted.map(|c| -c) } else { fitted }
+    fn axis(&self, set: InstructionSet, fitted: [f32; 3]) -> [f32; 3] {
+        if along(set, &self.members, &fitted, AXIS_SHARE) < 0.0 { fitted.map(|c| -c) } else { fitted }
     }
 
     /// Makes the patches that wait into values.
@@ -93,12 +98,13 @@ pub(super) fn patches<T: Send>(
     let fitted =
         extract_within(&surface, ball.into(), &queries, &ExtractOptions::default(), &monitor.apart())?;
     let index = CellIndex::of_positions(surface.len(), |i| surface.position(i), radius, monitor)?;
+    let curved: Vec<Curved> = index.point_of_rank.iter().map(|&i| support.curved[i as usize]).collect();
     let finite = |i: usize| Some(places[i]).filter(|place| place.iter().all(|c| c.is_finite()));
     let asked = CellIndex::of_positions(places.len(), finite, radius, monitor)?;
     let worker = || {
         let (pools, waiting) = (Vec::with_capacity(TOGETHER), Vec::with_capacity(TOGETHER));
-        let (places, members) = (Vec::new(), Vec::new());
-        let patch = Patch { index: &index, curved: &support.curved, places, members, pools, waiting };
+        let (members, pooling) = (Vec::new(), Pooling::new());
+        let patch = Patch { curved: &curved, members, count: 0, pooling, pools, waiting };
         (DirectWalk::new(&index, set), patch)
     };
     let entries: Vec<Vec<Entry<T>>> = asked
@@ -145,16 +151,16 @@ fn entry<T>(
     fitted: [f32; 3],
     number: usize,
 ) -> Entry<T> {
-    patch.places.clear();
     patch.members.clear();
+    patch.count = 0;
     walk.visit(offset, patch);
-    let count = patch.members.len();
-    let axis = patch.axis(fitted);
+    let count = patch.count;
+    let axis = patch.axis(walk.set, fitted);
     if axis[0].is_finite() && count >= FEWEST {
         let x = tangent(axis);
-        let mut sums = Pool::ZERO;
-        pool(walk.set, &patch.places, &patch.members, &[x, cross(axis, x), axis], &mut sums);
-        patch.pools.push(sums);
+        patch.pools.push(Pool::ZERO);
+        let sums = patch.pools.last_mut().expect("just added");
+        patch.pooling.pool(walk.set, &patch.members, count, &[x, cross(axis, x), axis], sums);
         patch.waiting.push(number);
     }
     Entry { query, axis, count: count as u32, value: None }

@@ -6,6 +6,7 @@ pub(crate) mod field;
 pub(crate) mod instruction_set;
 pub(crate) mod lanes;
 pub(crate) mod partition;
+pub(crate) mod products;
 pub(crate) mod select;
 pub(crate) mod split;
 
