@@ -62,7 +62,7 @@ class Scene:
         """Of the points in the cloud that was given."""
         self.points: Array = self._cloud.offsets
         self.spacing = point_spacing(self.points)
-        self._threads = threads
+        self.threads = threads
         origin = cloud.origin - self.middle
         if cloud.viewpoint is None and cloud.viewpoints is None and self._seen_from(origin):
             # Most sensors are at the origin of their own coordinates.
@@ -75,7 +75,7 @@ class Scene:
         """Describe its places."""
         if radius not in self._signatures:
             found = field_signatures(
-                self.points, radius, voxel=radius / PLACES, normals=self._normals, threads=self._threads
+                self.points, radius, voxel=radius / PLACES, normals=self._normals, threads=self.threads
             )
             self._signatures[radius] = found.take(found.ok)
         return self._signatures[radius]
@@ -84,7 +84,7 @@ class Scene:
         """Give its surface with one place per voxel."""
         if voxel not in self._parts:
             self._parts[voxel] = Surroundings(
-                *surface_places(self.points, self._normals, voxel, self._threads), voxel
+                *surface_places(self.points, self._normals, voxel, self.threads), voxel
             )
         return self._parts[voxel]
 

@@ -210,8 +210,10 @@ def _instance(candidate: _Candidate, scene: Scene, taken: NDArray[np.bool_]) -> 
     witness, model = candidate.witness, candidate.model
     around = witness.around
     near = candidate.near(scene.points)
-    moved = spread(scene.points[near & ~taken], _MOST_FITTED)
-    fitted = contact(moved, Surface(model.points, around.voxel), _inverse(candidate.pose), around.voxel)
+    moved = spread(scene.points[near & ~taken], _MOST_FITTED, scene.threads)
+    fitted = contact(
+        moved, Surface(model.points, around.voxel, scene.threads), _inverse(candidate.pose), around.voxel
+    )
     if fitted is None:
         return None
     pose = _inverse(fitted.pose)
