@@ -1,0 +1,130 @@
+"""A scan put onto the map: GICP, the last steps by point to plane, and how well it then lies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import small_gicp
+from numpy.typing import NDArray
+
+from surfsig.odometry.local_map import LocalMap, prepared
+from surfsig.odometry.motion import moved, orthonormal, small
+from surfsig.shapes.uncertainty import block_count, block_covariance, spatial_blocks
+
+Array = NDArray[np.float64]
+
+_MOST_STEPS = 30
+_SETTLED = 1e-4
+"""Radians, and voxels: a step that is none."""
+_LAST_STEPS = 2
+_NEAR = 2.0
+"""Voxels between a place and the nearest one of the map that may be the same."""
+_ON = 0.5
+"""Voxels from the map's surface within which a place lies on it, at most."""
+_STRAY = 3.0
+"""Standard deviations from it, likewise."""
+_FLOOR = 0.02
+"""Voxels: a deviation below it is none."""
+_HELD = 5e-3
+"""Mean square of the heights that the least of all motions makes, below which it is free."""
+_FEWEST = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """How a scan lies in the map; lengths are in voxels."""
+
+    pose: Array
+    """T_map_scan."""
+    covariance: Array
+    """(6, 6), of the small motion in the scan's axes that is missing."""
+    overlap: float
+    """Share of the scan's places that lie on the map's surface."""
+    held: bool
+    """Whether the surfaces hold the scan in all directions."""
+    scans: NDArray[np.int64]
+    """Which scans the places came from that it lies on."""
+
+
+class Scan:
+    """A scan's places about its sensor, (n, 3), in voxels."""
+
+    def __init__(self, points: Array, threads: int) -> None:
+        self.points = points
+        self.cloud, _ = prepared(points, threads)
+
+    def __len__(self) -> int:
+        """Return the number of places."""
+        return len(self.points)
+
+
+def align(scan: Scan, around: LocalMap, start: Array, reach: float) -> Alignment | None:
+    """Find a scan's pose in a map from a start nearby; None where they hardly touch.
+
+    Parameters
+    ----------
+    scan
+        The scan.
+    around
+        The map.
+    start
+        T_map_scan, (4, 4).
+    reach
+        Voxels between partners, at most, to begin with.
+    """
+    cloud, tree, normals = around.prepared()
+    pose = start
+    # One thread: several would add up in an order of their own.
+    for distance in (reach, min(reach, _NEAR)):
+        found = small_gicp.align(
+            cloud,
+            scan.cloud,
+            tree,
+            init_T_target_source=pose,
+            registration_type="GICP",
+            max_correspondence_distance=distance,
+            num_threads=1,
+            max_iterations=_MOST_STEPS,
+            rotation_epsilon=_SETTLED,
+            translation_epsilon=_SETTLED,
+        )
+        if found.num_inliers < _FEWEST:
+            return None
+        pose = np.array(found.T_target_source)
+    for step in range(_LAST_STEPS + 1):
+        places = moved(pose, scan.points)
+        numbers, squares = tree.batch_nearest_neighbor_search(places)
+        nearest = np.asarray(numbers)
+        near = np.asarray(squares) < _NEAR**2
+        heights = np.einsum("ij,ij->i", normals[nearest], places - around.points[nearest])
+        spread = 1.4826 * float(np.median(np.abs(heights[near]))) if near.any() else 0.0
+        on = near & (np.abs(heights) < min(_ON, _STRAY * max(spread, _FLOOR)))
+        if on.sum() < _FEWEST:
+            return None
+        # The height above the map changes so with a small motion of the scan in its own axes.
+        own = normals[nearest[on]] @ pose[:3, :3]
+        design = np.hstack([np.cross(scan.points[on], own), own])
+        if step < _LAST_STEPS:
+            change = -np.linalg.lstsq(design, heights[on], rcond=1e-6)[0]
+            pose = orthonormal(pose @ small(change))
+    return Alignment(
+        pose,
+        _covariance(design, heights[on], scan.points[on]),
+        float(on.mean()),
+        _is_held(design),
+        around.scans[nearest[on]],
+    )
+
+
+def _is_held(design: Array) -> bool:
+    unit = float(np.sqrt((design[:, :3] ** 2).sum(axis=1).mean())) or 1.0
+    scaled = design / np.repeat([unit, 1.0], 3)
+    return float(np.linalg.eigvalsh(scaled.T @ scaled)[0]) > _HELD * len(design)
+
+
+def _covariance(design: Array, heights: Array, points: Array) -> Array:
+    """Neighbouring places err alike: blocks of them count as independent, not each."""
+    blocks = spatial_blocks(points, block_count(points, heights))
+    covariance, _ = block_covariance(design, heights, blocks)
+    return covariance

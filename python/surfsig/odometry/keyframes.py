@@ -1,0 +1,103 @@
+"""Scans that are kept, to find the way back to where the sensor was before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfsig.field import FieldSignatures, keypoints, match_fields
+from surfsig.odometry.alignment import Alignment, Scan, align
+from surfsig.odometry.consensus import agreed_pose
+from surfsig.odometry.local_map import LocalMap
+from surfsig.odometry.motion import inverse, moved, turned_by
+from surfsig.point_cloud import PointCloud
+
+Array = NDArray[np.float64]
+
+_APART = 0.3
+"""Of the median distance that scans see, between keyframes."""
+_TURNED = np.radians(30.0)
+"""Between keyframes from one place."""
+_SEARCHED = 50
+"""Keyframes that are searched, the latest first."""
+_TRIED = 3
+"""Poses that are tried on the map, those first that most matches agree with."""
+_AGREE = 12
+"""Matches that agree with a pose that is tried, at least."""
+_REACH = 4.0
+"""Voxels between partners: so far off may a pose be that matches propose."""
+
+
+@dataclass(eq=False)
+class Keyframe:
+    """A scan that is kept: its pose T_map_scan, its number, and its places; lengths are in voxels."""
+
+    number: int
+    pose: Array
+    points: NDArray[np.float32]
+    fields: FieldSignatures | None = None
+
+
+class Keyframes:
+    """The keyframes of a sequence, one for each place and direction from where it was seen."""
+
+    def __init__(self, reach: float, patch: float, threads: int) -> None:
+        self._reach, self._patch, self._threads = reach, patch, threads
+        self._kept: list[Keyframe] = []
+
+    def offer(self, scan: Scan, pose: Array, number: int) -> None:
+        """Keep a scan, unless one is there from a place nearby."""
+        to_scan = inverse(pose)
+        for other in reversed(self._kept):
+            between = to_scan @ other.pose
+            near = float(np.linalg.norm(between[:3, 3])) < _APART * self._reach
+            if near and turned_by(between) < _TURNED:
+                return
+        self._kept.append(Keyframe(number, pose, scan.points.astype(np.float32)))
+
+    def submap(self, center: Array, distance: float) -> LocalMap:
+        """Make a map of the keyframes that were taken within a distance of a place."""
+        result = LocalMap(self._threads)
+        for keyframe in self._kept:
+            if np.linalg.norm(keyframe.pose[:3, 3] - center) <= distance:
+                result.add(moved(keyframe.pose, keyframe.points.astype(np.float64)), keyframe.number)
+        result.keep_within(center, distance)
+        return result
+
+    def find(self, scan: Scan, distance: float) -> tuple[Alignment, LocalMap] | None:
+        """Find where a scan was taken, by its signatures; None where nothing fits.
+
+        Parameters
+        ----------
+        scan
+            The scan.
+        distance
+            From the sensor to the farthest places of a map.
+
+        Returns
+        -------
+        Of the poses that matches propose the one that lies best on the keyframes' map, and that map.
+        """
+        ours = self._described(scan.points)
+        proposals: list[tuple[int, Array]] = []
+        for keyframe in self._kept[: -_SEARCHED - 1 : -1]:
+            if keyframe.fields is None:
+                keyframe.fields = self._described(keyframe.points)
+            pose, count = agreed_pose(match_fields(ours, keyframe.fields), ours, keyframe.fields)
+            if count >= _AGREE:
+                proposals.append((count, keyframe.pose @ pose))
+        proposals.sort(key=lambda proposal: -proposal[0])
+        best: tuple[Alignment, LocalMap] | None = None
+        for _, pose in proposals[:_TRIED]:
+            around = self.submap(pose[:3, 3], distance)
+            found = align(scan, around, pose, _REACH)
+            if found is not None and found.held and (best is None or found.overlap > best[0].overlap):
+                best = found, around
+        return best
+
+    def _described(self, points: NDArray[np.floating]) -> FieldSignatures:
+        """Describe a scan's keypoints, as seen from its sensor."""
+        cloud = PointCloud(points, viewpoint=np.zeros(3))
+        return keypoints(cloud, self._patch, threads=self._threads)
