@@ -18,17 +18,16 @@ _ALONG = 0.8
 _ROUNDS = 5
 
 
-def agreed_pose(
-    matches: FieldMatches, source: FieldSignatures, target: FieldSignatures
-) -> tuple[Array, int]:
+def agreed_pose(matches: FieldMatches, source: FieldSignatures, target: FieldSignatures) -> tuple[Array, int]:
     """Give the pose T_target_source that most matches agree with, and how many do.
 
     Each match proposes its own; the best is fitted again to the places of those that agree.
     """
     ours, theirs = source.take(matches.source), target.take(matches.target)
+    places, partners = ours.points.astype(np.float64), theirs.points.astype(np.float64)
 
     def agree(pose: Array) -> NDArray[np.bool_]:
-        apart = np.linalg.norm(moved(pose, ours.points) - theirs.points, axis=1)
+        apart = np.linalg.norm(moved(pose, places) - partners, axis=1)
         along = np.einsum("ij,ij->i", ours.axes @ pose[:3, :3].T, theirs.axes)
         return np.asarray((apart < _NEAR * source.radius) & (along > _ALONG))
 
@@ -40,11 +39,11 @@ def agreed_pose(
     for _ in range(_ROUNDS):
         if agreeing.sum() < 3:
             break
-        places, partners = ours.points[agreeing], theirs.points[agreeing]
-        rotation, _ = Rotation.align_vectors(partners - partners.mean(axis=0), places - places.mean(axis=0))
+        first, second = places[agreeing].mean(axis=0), partners[agreeing].mean(axis=0)
+        rotation, _ = Rotation.align_vectors(partners[agreeing] - second, places[agreeing] - first)
         pose = np.eye(4)
         pose[:3, :3] = rotation.as_matrix()
-        pose[:3, 3] = partners.mean(axis=0) - pose[:3, :3] @ places.mean(axis=0)
+        pose[:3, 3] = second - pose[:3, :3] @ first
         now = agree(pose)
         if now.sum() < agreeing.sum():
             break

@@ -24,7 +24,7 @@ _SEARCHED = 50
 """Keyframes that are searched, the latest first."""
 _TRIED = 3
 """Poses that are tried on the map, those first that most matches agree with."""
-_AGREE = 12
+_AGREE = 24
 """Matches that agree with a pose that is tried, at least."""
 _REACH = 4.0
 """Voxels between partners: so far off may a pose be that matches propose."""

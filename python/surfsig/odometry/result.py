@@ -52,7 +52,9 @@ class Odometry:
 
     def __repr__(self) -> str:
         """Say how many there are, and what became of them."""
-        told = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in self.counts().items() if count)
+        told = ", ".join(
+            f"{count} {name.replace('_', ' ')}" for name, count in self.counts().items() if count
+        )
         return f"Odometry({len(self)} scans: {told or 'none'})"
 
     def counts(self) -> dict[str, int]:

@@ -24,8 +24,8 @@ _START = 0.1
 """Of the median distance that scans see: deviation of a prediction before any is known."""
 _STILL = 0.1
 """Voxels: a deviation below it says nothing about motion."""
-_DROP = 0.8
-"""Of the usual overlap, below which a pose is doubted."""
+_DROP = 0.85
+"""Of the usual overlap: below, a pose is doubted, and one that was searched not believed."""
 _LEAST = 0.4
 """Overlap of a pose that is believed, at least; as much more than another's must be to take its place."""
 _BETTER = 0.1
@@ -77,14 +77,12 @@ class Tracker:
         self._range = self._fixed_range or max(self._range, farthest)
         if not len(self._map):
             return self._took(scan, np.eye(4), np.zeros((6, 6)), ScanStatus.TRACKED, 1.0)
-        prediction = self._last
-        for _ in range(self._since):
-            prediction = prediction @ self._motion
+        prediction = self._last @ np.linalg.matrix_power(self._motion, self._since)
         found = align(scan, self._map, prediction, self._partner_distance())
         status = ScanStatus.TRACKED
         if self._is_doubtful(found):
             again = self._keyframes.find(scan, self._range)
-            if again is not None and (found is None or again[0].overlap > found.overlap + _BETTER):
+            if again is not None and self._is_believed(again[0], found):
                 found, self._map = again
                 status = ScanStatus.RELOCALISED
         if found is None or not found.held or found.overlap < _LEAST:
@@ -102,7 +100,7 @@ class Tracker:
             return self._distance
         squares = [_START * self._reach, *self._deviations]
         deviation = float(np.sqrt(np.mean(np.square(squares))))
-        return max(_NARROWEST, _SIGMAS * deviation * np.sqrt(self._since))
+        return max(_NARROWEST, _SIGMAS * deviation * self._since**0.5)
 
     def _learn(self, off: Array) -> None:
         """Remember by how much a prediction was wrong, at the median distance."""
@@ -111,8 +109,15 @@ class Tracker:
             self._deviations.append(deviation)
 
     def _is_doubtful(self, found: Alignment | None) -> bool:
-        usual = float(np.median(self._overlaps))
-        return found is None or not found.held or found.overlap < _DROP * usual
+        return found is None or not found.held or found.overlap < _DROP * self._usual()
+
+    def _is_believed(self, again: Alignment, found: Alignment | None) -> bool:
+        """Tell whether a pose that was searched may take the place of the one that was expected."""
+        usual = again.overlap >= _DROP * self._usual()
+        return usual and (found is None or again.overlap > found.overlap + _BETTER)
+
+    def _usual(self) -> float:
+        return float(np.median(self._overlaps)) if self._overlaps else _LEAST
 
     def _covariance(self, found: Alignment) -> Array:
         """Add the error of the map, which is that of the scans that it was made of."""
@@ -128,10 +133,10 @@ class Tracker:
         """Go on from a pose."""
         if status == ScanStatus.RELOCALISED:
             self._motion, self._last_mapped = np.eye(4), None
-            self._overlaps.clear()
-        elif self._since == 1 and len(self._map):
+        elif self._since == 1:
             self._motion = inverse(self._last) @ pose
-        self._overlaps.append(overlap)
+        if len(self._map):
+            self._overlaps.append(overlap)
         if self._is_new(pose):
             self._map.add(moved(pose, scan.points), self._number)
             self._map.keep_within(pose[:3, 3], self._range)

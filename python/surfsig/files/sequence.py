@@ -1,0 +1,154 @@
+"""Sequences of scans: files, folders and ROS bags, read one by one."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import warnings
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from surfsig.errors import FileFormatError, InvalidInputError
+from surfsig.files.ros_bag import BagTopic, bag_of
+from surfsig.point_cloud import PointCloud
+
+Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
+
+_NUMBER = re.compile(r"\d+(\.\d*)?")
+_NANOSECONDS_DIGITS = 16
+"""Digits from which on a whole number counts nanoseconds: as seconds it would lie beyond any clock's time."""
+
+
+class TimedScan(NamedTuple):
+    """A scan, and when it was taken.
+
+    Attributes
+    ----------
+    timestamp
+        In seconds.
+    cloud
+        The scan.
+    """
+
+    timestamp: float
+    cloud: PointCloud
+
+
+class ScanSequence:
+    """Scans that are read one by one, as often as they are walked through.
+
+    A file that cannot be read gives a warning and a scan without points.
+
+    Parameters
+    ----------
+    parts
+        Files, and topics of bags.
+    reading
+        What `surfsig.read` is asked for.
+    """
+
+    def __init__(self, parts: list[Path | BagTopic], reading: dict[str, Any]) -> None:
+        self._parts, self._reading = parts, reading
+        self._times = _times(parts)
+
+    def __len__(self) -> int:
+        """Return the number of scans."""
+        return sum(1 if isinstance(part, Path) else len(part) for part in self._parts)
+
+    def __iter__(self) -> Iterator[TimedScan]:
+        """Read scan by scan."""
+        number = 0
+        for part in self._parts:
+            clouds = [(0.0, scan_or_none(part, **self._reading))] if isinstance(part, Path) else part
+            for stamp, cloud in clouds:
+                if self._times is not None:
+                    stamp = self._times[number]
+                elif isinstance(part, Path):
+                    stamp = float(number)
+                yield TimedScan(stamp, cloud)
+                number += 1
+
+
+def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> ScanSequence:
+    """Find the scans of a sequence, to be read one by one.
+
+    Parameters
+    ----------
+    paths
+        A file that `surfsig.read` reads, a folder of such files, or a ROS bag (a ROS 1 file, or a ROS 2
+        folder or file of it), or several of them. Files of a folder are taken in the natural order of their
+        names (2 before 10), and so are several paths; hidden files are left out.
+    topic
+        Of bags: which topic's clouds (sensor_msgs/PointCloud2), where there are several.
+    **reading
+        Of files: `unit`, `box`, ... as `surfsig.read` takes them.
+
+    Returns
+    -------
+    ScanSequence
+        Gives (timestamp, cloud). A timestamp is that in a message's header; the number that the file's name
+        is, in seconds (a whole number of 16 digits or more counts nanoseconds), where all names are numbers
+        that grow; otherwise the scan's number.
+
+    Raises
+    ------
+    OSError
+        If a path is missing.
+    FileFormatError
+        If a bag is broken, or a folder holds no files.
+    InvalidInputError
+        If there is nothing to read, or the topic does not fit.
+    """
+    given = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
+    parts: list[Path | BagTopic] = []
+    for path in sorted((Path(path) for path in given), key=_natural):
+        # Whatever is missing says so now, and not after hours.
+        path.stat()
+        bag = bag_of(path)
+        if bag is not None:
+            parts.append(BagTopic(bag, topic))
+        elif path.is_dir():
+            files = [file for file in path.iterdir() if file.is_file() and file.name[0] != "."]
+            if not files:
+                raise FileFormatError(f"{path}: holds no files")
+            parts.extend(sorted(files, key=_natural))
+        else:
+            parts.append(path)
+    if not parts:
+        raise InvalidInputError("there are no scans")
+    if topic is not None and not any(isinstance(part, BagTopic) for part in parts):
+        raise InvalidInputError("topic means something for ROS bags only")
+    return ScanSequence(parts, reading)
+
+
+def scan_or_none(path: Path, **reading: Any) -> PointCloud:
+    """Read a scan; one that is broken gives a warning and no points, so that the others can be used."""
+    from surfsig.files import read
+
+    try:
+        return read(path, **reading)
+    except FileFormatError as error:
+        warnings.warn(f"{error}; taken as a scan without points", stacklevel=2)
+        return PointCloud(np.zeros((0, 3), np.float32))
+
+
+def _natural(path: Path) -> list[tuple[int, int, str]]:
+    """Compare runs of digits as numbers; the name itself decides between 1 and 01."""
+    words = re.split(r"(\d+)", str(path))
+    return [(0, int(word), word) if word.isdecimal() else (1, 0, word) for word in words]
+
+
+def _times(parts: list[Path | BagTopic]) -> list[float] | None:
+    """Give the times that all files' names are."""
+    times = []
+    for part in parts:
+        if not isinstance(part, Path) or _NUMBER.fullmatch(part.stem) is None:
+            return None
+        whole = part.stem.isdecimal() and len(part.stem.lstrip("0")) >= _NANOSECONDS_DIGITS
+        times.append(int(part.stem) / 1e9 if whole else float(part.stem))
+    grows = all(after > before for before, after in itertools.pairwise(times))
+    return times if grows else None

@@ -1,0 +1,75 @@
+"""Scan by scan from files' units and frames to the tracker's, and back."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfsig.files.sequence import TimedScan
+from surfsig.odometry.alignment import Scan
+from surfsig.odometry.motion import adjoint
+from surfsig.odometry.result import Odometry, ScanStatus
+from surfsig.odometry.scale import FEWEST, Scale
+from surfsig.odometry.tracker import Tracker
+
+Array = NDArray[np.float64]
+
+
+class Way:
+    """Scans in their own unit in, poses in that unit out; `Tracker` counts in voxels about the sensor."""
+
+    def __init__(
+        self, voxel: float | None, distance: float | None, map_range: float | None, threads: int
+    ) -> None:
+        self._voxel, self._distance, self._map_range, self._threads = voxel, distance, map_range, threads
+        self._scale: Scale | None = None
+        self._steps: list[tuple[float, Array, Array, ScanStatus, float]] = []
+
+    def __len__(self) -> int:
+        """Return the number of scans so far."""
+        return len(self._steps)
+
+    def add(self, scan: TimedScan) -> None:
+        """Find the pose of the next scan."""
+        sensor = np.zeros(3) if scan.cloud.viewpoint is None else scan.cloud.viewpoint
+        points = scan.cloud.offsets[scan.cloud.finite] + (scan.cloud.origin - sensor)
+        if self._scale is None and len(points) >= FEWEST and np.ptp(points, axis=0).any():
+            self._scale = scale = Scale.of(points, self._voxel)
+            self._first_sensor = sensor
+            self._tracker = Tracker(
+                scale.reach / scale.voxel,
+                scale.patch / scale.voxel,
+                None if self._map_range is None else self._map_range / scale.voxel,
+                None if self._distance is None else self._distance / scale.voxel,
+                self._threads,
+            )
+        places = points if self._scale is None else self._scale.thinned(points)
+        if self._scale is None or len(places) < FEWEST:
+            if self._scale is not None:
+                self._tracker.skip()
+            nothing = np.full((4, 4), np.nan), np.full((6, 6), np.nan)
+            self._steps.append((scan.timestamp, *nothing, ScanStatus.TOO_FEW_POINTS, 0.0))
+            return
+        step = self._tracker.follow(Scan(places, self._threads))
+        size = self._scale.voxel
+        pose = step.pose.copy()
+        # From places about the sensor, in voxels, to the scan's own frame and the world's.
+        pose[:3, 3] = size * pose[:3, 3] + self._first_sensor - pose[:3, :3] @ sensor
+        unit = np.repeat([1.0, size], 3)
+        to_sensor = np.eye(4)
+        to_sensor[:3, 3] = sensor
+        carried = adjoint(to_sensor) * unit
+        covariance = carried @ step.covariance @ carried.T
+        self._steps.append((scan.timestamp, pose, covariance, step.status, step.overlap))
+
+    def result(self) -> Odometry:
+        """Give the way so far."""
+        timestamps, poses, covariances, status, overlaps = zip(*self._steps, strict=True)
+        return Odometry(
+            poses=np.array(poses),
+            covariances=np.array(covariances),
+            status=np.array(status, np.uint8),
+            overlaps=np.array(overlaps),
+            timestamps=np.array(timestamps, np.float64),
+            voxel=np.nan if self._scale is None else self._scale.voxel,
+        )
