@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.convert.libraries import library
-from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
+from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.columns import cloud_from_columns, columns_of
 from surfsig.files.pcd import MAX_NUMBERS, PACKED_COLOURS
 from surfsig.point_cloud import PointCloud
@@ -96,10 +96,11 @@ class BagTopic:
         try:
             with highlevel.AnyReader([self.path], default_typestore=store) as reader:
                 yield reader
-        except (SurfsigError, OSError, MemoryError):
+        except (FileFormatError, FileNotFoundError, PermissionError):
             raise
         except Exception as error:
-            # What a damaged bag makes of rosbags and the libraries below it is of many kinds.
+            # What a damaged bag makes of rosbags and the libraries below it is of many kinds, MemoryError
+            # among them.
             told = " ".join(str(error).split())[:100] or type(error).__name__
             raise FileFormatError(f"{self.path}: the bag is cut off or broken ({told})") from None
 

@@ -41,7 +41,8 @@ class TimedScan(NamedTuple):
 class ScanSequence:
     """Scans that are read one by one, as often as they are walked through.
 
-    A file that cannot be read gives a warning and a scan without points.
+    A file that cannot be read gives a warning and a scan without points; a bag that is broken in its middle
+    gives one and ends there.
 
     Parameters
     ----------
@@ -63,14 +64,20 @@ class ScanSequence:
         """Read scan by scan."""
         number = 0
         for part in self._parts:
-            clouds = [(0.0, scan_or_none(part, **self._reading))] if isinstance(part, Path) else part
-            for stamp, cloud in clouds:
+            for stamp, cloud in self._scans_of(part):
                 if self._times is not None:
                     stamp = self._times[number]
-                elif isinstance(part, Path):
-                    stamp = float(number)
-                yield TimedScan(stamp, cloud)
+                yield TimedScan(float(number) if stamp is None else stamp, cloud)
                 number += 1
+
+    def _scans_of(self, part: Path | BagTopic) -> Iterator[tuple[float | None, PointCloud]]:
+        if isinstance(part, Path):
+            yield None, scan_or_none(part, **self._reading)
+            return
+        try:
+            yield from part
+        except FileFormatError as error:
+            warnings.warn(f"{error}; its scans end there", stacklevel=2)
 
 
 def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> ScanSequence:
@@ -84,8 +91,8 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
         names (2 before 10), and so are several paths; hidden files are left out.
     topic
         Of bags: which topic's clouds (sensor_msgs/PointCloud2), where there are several.
-    **reading
-        Of files: `unit`, `box`, ... as `surfsig.read` takes them.
+    reading
+        Of files: further keywords, `unit`, `box`, ... as `surfsig.read` takes them.
 
     Returns
     -------
@@ -99,29 +106,34 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
     OSError
         If a path is missing.
     FileFormatError
-        If a bag is broken, or a folder holds no files.
+        If a bag cannot be opened, or a folder holds no files.
     InvalidInputError
         If there is nothing to read, or the topic does not fit.
     """
     given = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
     parts: list[Path | BagTopic] = []
-    for path in sorted((Path(path) for path in given), key=_natural):
+    chosen = sorted((Path(path) for path in given), key=_natural)
+    for path in chosen:
         # Whatever is missing says so now, and not after hours.
         path.stat()
         bag = bag_of(path)
         if bag is not None:
             parts.append(BagTopic(bag, topic))
         elif path.is_dir():
-            files = [file for file in path.iterdir() if file.is_file() and file.name[0] != "."]
+            inside = (file for file in path.iterdir() if file.is_file() and file.name[0] != ".")
+            files = sorted(inside, key=_natural)
             if not files:
                 raise FileFormatError(f"{path}: holds no files")
-            parts.extend(sorted(files, key=_natural))
+            parts += files
         else:
             parts.append(path)
     if not parts:
         raise InvalidInputError("there are no scans")
-    if topic is not None and not any(isinstance(part, BagTopic) for part in parts):
-        raise InvalidInputError("topic means something for ROS bags only")
+    bags = [part for part in parts if isinstance(part, BagTopic)]
+    if topic is not None and not bags:
+        raise InvalidInputError(f"{chosen[0]}: is no ROS bag, and so has no topic '{topic}'")
+    if reading and bags:
+        raise InvalidInputError(f"{bags[0].path}: '{next(iter(reading))}' means nothing for a ROS bag")
     return ScanSequence(parts, reading)
 
 

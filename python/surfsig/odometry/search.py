@@ -72,12 +72,12 @@ def odometry(
     InvalidInputError
         If an argument has no meaning, there are no scans, or small_gicp is not installed.
     FileFormatError
-        If a bag is broken.
+        If a bag cannot be opened.
 
     Warns
     -----
     UserWarning
-        If a file cannot be read; it then counts as a scan without points.
+        If a file cannot be read, which then counts as a scan without points, or a bag ends too early.
     """
     edge, partners, around = (
         None if value is None else positive_length(value, name)

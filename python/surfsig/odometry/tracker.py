@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
 
@@ -100,7 +101,7 @@ class Tracker:
             return self._distance
         squares = [_START * self._reach, *self._deviations]
         deviation = float(np.sqrt(np.mean(np.square(squares))))
-        return max(_NARROWEST, _SIGMAS * deviation * self._since**0.5)
+        return max(_NARROWEST, _SIGMAS * deviation * math.sqrt(self._since))
 
     def _learn(self, off: Array) -> None:
         """Remember by how much a prediction was wrong, at the median distance."""

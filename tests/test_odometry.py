@@ -1,0 +1,192 @@
+"""The way of a simulated lidar through a building, whose truth is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import moving_sensor
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+import surfsig
+from surfsig import InvalidInputError, Odometry, PointCloud, ScanStatus, TimedScan, simulate
+from surfsig.odometry.local_map import LocalMap
+from surfsig.odometry.motion import adjoint, small
+from surfsig.odometry.scale import Scale
+
+Array = NDArray[np.float64]
+
+NOTHING = PointCloud(np.zeros((0, 3)))
+
+
+@dataclass
+class Walk:
+    """Scans, and where they were taken: T_building_sensor, (n, 4, 4)."""
+
+    scans: list[PointCloud]
+    true: Array
+
+
+@pytest.fixture(scope="module")
+def walk() -> Walk:
+    """Through the first room and into the corridor: 13 m in steps of 28 cm."""
+    scene = moving_sensor.building()
+    true = moving_sensor.way(90)[:48]
+    return Walk([moving_sensor.scan(scene, pose, seed) for seed, pose in enumerate(true)], true)
+
+
+@pytest.fixture(scope="module")
+def found(walk: Walk) -> Odometry:
+    return surfsig.odometry(walk.scans)
+
+
+def missing_motions(found: Odometry, true: Array) -> Array:
+    """Give the small motions m of T_true = T exp(m), (n, 6), to first order in the translation."""
+    off = np.linalg.inv(found.poses) @ np.linalg.inv(true[0]) @ true
+    return np.column_stack([Rotation.from_matrix(off[:, :3, :3]).as_rotvec(), off[:, :3, 3]])
+
+
+def test_drift_is_below_two_thousandths_of_the_way(found: Odometry, walk: Walk) -> None:
+    assert found.counts() == {"tracked": 48, "relocalised": 0, "lost": 0, "too_few_points": 0}
+    off, turned = moving_sensor.errors(found.poses, walk.true)
+    steps = np.linalg.norm(np.diff(walk.true[:, :3, 3], axis=0), axis=1)
+    assert found.length == pytest.approx(steps.sum(), rel=2e-3)
+    assert off.max() < 0.002 * found.length
+    assert np.degrees(turned.max()) < 0.1
+    np.testing.assert_array_equal(found.poses[0], np.eye(4))
+    np.testing.assert_array_equal(found.timestamps, np.arange(48))
+
+
+def test_covariances_are_as_large_as_the_errors(found: Odometry, walk: Walk) -> None:
+    motions = missing_motions(found, walk.true)[1:]
+    nees = np.einsum("ni,nij,nj->n", motions, np.linalg.inv(found.covariances[1:]), motions)
+    # 6 for Gaussian errors whose covariance is known.
+    assert 6 / 4 < nees.mean() < 6 * 4
+    np.testing.assert_allclose(found.covariances, found.covariances.transpose(0, 2, 1), atol=1e-18)
+    # The map goes on from the first scan, and errors with it.
+    sizes = np.trace(found.covariances[:, 3:, 3:], axis1=1, axis2=2)
+    assert sizes[0] == 0
+    assert sizes[-8:].mean() > 2 * sizes[1:9].mean()
+
+
+def test_a_sensor_that_was_carried_away_is_found_again(walk: Walk) -> None:
+    carried = [*range(0, 40, 2), 5, 7, 9, 11]
+    result = surfsig.odometry([walk.scans[number] for number in carried])
+    assert result.status.tolist() == [0] * 20 + [ScanStatus.RELOCALISED] + [0] * 3
+    off, turned = moving_sensor.errors(result.poses, walk.true[carried])
+    assert off.max() < 0.03
+    assert np.degrees(turned.max()) < 0.2
+
+
+def test_scans_without_a_place_do_not_stop_the_rest(walk: Walk) -> None:
+    """No points, a few, none that is finite, and a place that was never seen: then on as before."""
+    elsewhere = moving_sensor.scan(
+        simulate.Scene([simulate.Placed(simulate.Box((1.0, 0.7, 0.5)))]), np.eye(4), seed=0
+    )
+    few = PointCloud(walk.scans[3].points[:49])
+    blind = PointCloud(np.full((500, 3), np.nan))
+    scans = [NOTHING, *walk.scans[:4], NOTHING, walk.scans[5], few, blind, elsewhere, *walk.scans[8:10]]
+    result = surfsig.odometry(scans)
+    few_points, lost = ScanStatus.TOO_FEW_POINTS, ScanStatus.LOST
+    assert result.status.tolist() == [
+        few_points, 0, 0, 0, 0, few_points, 0, few_points, few_points, lost, 0, 0
+    ]  # fmt: skip
+    without = np.isin(result.status, (few_points, lost))
+    assert np.isnan(result.poses[without]).all()
+    assert np.isnan(result.covariances[without]).all()
+    off, _ = moving_sensor.errors(result.poses[~without], walk.true[[0, 1, 2, 3, 5, 8, 9]])
+    assert off.max() < 0.02
+
+
+def test_only_empty_scans() -> None:
+    result = surfsig.odometry([NOTHING, NOTHING])
+    assert result.status.tolist() == [ScanStatus.TOO_FEW_POINTS] * 2
+    assert np.isnan(result.poses).all()
+    assert np.isnan(result.voxel)
+    assert result.length == 0
+
+
+def test_the_same_for_any_number_of_threads(walk: Walk) -> None:
+    scans = [*walk.scans[:15:3], walk.scans[1]]
+    first, second, third = (surfsig.odometry(scans, threads=threads) for threads in (1, 2, 1))
+    for other in (second, third):
+        for name in ("poses", "covariances", "status", "overlaps", "voxel"):
+            np.testing.assert_array_equal(getattr(first, name), getattr(other, name))
+
+
+def test_unit_and_place_of_the_frame_do_not_matter(walk: Walk) -> None:
+    """In millimetres, and the sensor not at 0 of its frame but at a known viewpoint."""
+    plain = surfsig.odometry(walk.scans[:8])
+    shift = np.array([3000.0, -2000.0, 500.0])
+    scans = [
+        PointCloud(1000.0 * c.points.astype(np.float64) + shift, viewpoint=shift) for c in walk.scans[:8]
+    ]
+    result = surfsig.odometry(scans)
+    frame = np.eye(4)
+    frame[:3, 3] = shift
+    expected = plain.poses.copy()
+    expected[:, :3, 3] *= 1000.0
+    expected = frame @ expected @ np.linalg.inv(frame)
+    np.testing.assert_allclose(result.poses, expected, atol=1.0)
+    unit = np.repeat([1.0, 1000.0], 3)
+    carried = adjoint(frame) * unit
+    # Another rounding may take other places for the same.
+    np.testing.assert_allclose(
+        np.sqrt(np.diagonal(result.covariances, axis1=1, axis2=2)),
+        np.sqrt(np.diagonal(carried @ plain.covariances @ carried.T, axis1=1, axis2=2)),
+        rtol=0.3,
+    )
+
+
+def test_scans_are_read_one_by_one(walk: Walk) -> None:
+    """Each is asked for after the one before is done, and let go."""
+    events: list[str] = []
+
+    def scans() -> Iterator[TimedScan]:
+        for number, cloud in enumerate(walk.scans[:3]):
+            events.append(f"read {number}")
+            yield TimedScan(10.5 + number, cloud)
+
+    result = surfsig.odometry(scans(), progress=lambda done, total: events.append(f"{done} of {total}"))
+    assert events == ["read 0", "1 of 1", "read 1", "2 of 2", "read 2", "3 of 3"]
+    assert result.timestamps.tolist() == [10.5, 11.5, 12.5]
+
+
+def test_mistakes_are_told() -> None:
+    cloud = PointCloud(np.random.default_rng(0).normal(size=(100, 3)))
+    for name in ("voxel", "distance", "map_range"):
+        with pytest.raises(InvalidInputError, match=f"^{name} must be"):
+            surfsig.odometry([cloud], **{name: -1.0})  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match="there are no scans"):
+        surfsig.odometry([])
+    with pytest.raises(InvalidInputError, match="scans must be several"):
+        surfsig.odometry(cloud)  # type: ignore[arg-type]
+
+
+def test_the_adjoint_carries_small_motions() -> None:
+    rng = np.random.default_rng(1)
+    pose = small(np.concatenate([rng.normal(size=3), rng.normal(size=3)]))
+    motion = 1e-6 * rng.normal(size=6)
+    carried = pose @ small(motion) @ np.linalg.inv(pose)
+    np.testing.assert_allclose(small(adjoint(pose) @ motion), carried, atol=1e-11)
+
+
+def test_the_map_keeps_the_first_place_of_each_voxel() -> None:
+    places = LocalMap(threads=1)
+    places.add(np.array([[0.2, 0.2, 0.2], [0.8, 0.1, 0.5], [-0.1, 0.0, 0.0]]), 0)
+    places.add(np.array([[0.9, 0.9, 0.9], [5.5, 0.0, 0.0]]), 7)
+    rows = {tuple(point): scan for point, scan in zip(places.points.tolist(), places.scans, strict=True)}
+    assert rows == {(0.2, 0.2, 0.2): 0, (-0.1, 0.0, 0.0): 0, (5.5, 0.0, 0.0): 7}
+    places.keep_within(np.zeros(3), 1.0)
+    assert len(places) == 2
+
+
+def test_the_voxel_is_filled_as_often_as_said() -> None:
+    points = np.random.default_rng(2).uniform(0, [10.0, 7.0, 0.0], (50_000, 3))
+    scale = Scale.of(points, None)
+    assert len(scale.thinned(points)) == pytest.approx(4000, rel=0.02)
+    sparse = points[:1000]
+    assert len(Scale.of(sparse, None).thinned(sparse)) == pytest.approx(800, rel=0.02)
