@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import surface_scenes
 from conftest import Finished
+from recurrence_scene import SCANNER, recurrence_scene
 from surface_points import Array
 from test_cli_errors import one_line
 
@@ -114,3 +115,30 @@ def test_nothing_found_is_said(shell: Shell, tmp_path: Path, points: Array, why:
 )
 def test_mistakes(shell: Shell, scan: Path, options: tuple[str, str], message: str) -> None:
     assert message in one_line(shell("surfaces", scan, *options))
+
+
+def test_what_recurs(shell: Shell, tmp_path: Path) -> None:
+    scene = recurrence_scene(7, columns=2, rows=2, kinds=("large ball",))
+    path, labelled = tmp_path / "scan.pcd", tmp_path / "labelled.npz"
+    surfsig.write(path, PointCloud(scene.cloud.offsets, viewpoint=SCANNER.viewpoint))
+    finished = shell("surfaces", path, "--recurrences", "-o", labelled, "--json", tmp_path / "out.json")
+    assert (finished.code, finished.err) == (0, "")
+    assert f"{path}: 4 of 4 pieces in 1 groups, 1 sizes of equal surfaces" in finished.out.splitlines()
+    group, balls = (line.split() for line in finished.out.splitlines()[-2:])
+    assert group[:8] == ["0", "piece", "4", "0", "1", "2", "3", "score"]
+    assert balls[:2] == ["sphere", "4"]
+    assert float(balls[balls.index("radius") + 1]) == pytest.approx(0.021, abs=1e-4)
+    values = json.loads((tmp_path / "out.json").read_text())["recurrences"]
+    members = values["groups"][0]["members"]
+    assert [member["piece"] for member in members] == [0, 1, 2, 3]
+    assert [direction["motion"] for direction in values["groups"][0]["free_directions"]] == ["turn"]
+    (equal,) = values["equal_surfaces"]
+    first, other = (values["pieces"][number]["center"] for number in (0, 1))
+    moved = np.array(members[1]["pose"]) @ [*first, 1.0]
+    # The middles of what is seen of two balls.
+    np.testing.assert_allclose(moved[:3], other, atol=5e-3)
+    assert equal["size"]["radius"] == pytest.approx(0.021, abs=1e-4)
+    assert len(equal["members"]) == 4
+    fields = surfsig.read(labelled).fields
+    assert np.unique(fields["piece"]).tolist() == [-1, 0, 1, 2, 3]
+    np.testing.assert_array_equal(fields["recurrence"], np.where(fields["piece"] >= 0, 0, -1))

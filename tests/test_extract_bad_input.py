@@ -165,6 +165,10 @@ def test_coordinates_beyond_the_lattice_are_an_error_that_names_them(points: Arr
     refused("too small for a coordinate", np.full((9, 3), 3.4e38, np.float32), RADIUS)
 
 
+def test_nearest_points_at_coordinates_beyond_any_radius_are_an_error_and_no_panic(points: Array) -> None:
+    refused("too small for a coordinate", 1e30 * points.astype(np.float64), None, neighbors=20)
+
+
 LAYOUTS: dict[str, Callable[[Any], Any]] = {
     "Fortran": np.asfortranarray,
     "every other": lambda p: np.repeat(p, 2, axis=0)[::2],

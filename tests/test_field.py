@@ -62,7 +62,7 @@ def _shares(value: float, bins: int) -> list[tuple[int, float]]:
     return [(low, 1.0 - place + low), (min(low + 1, bins - 1), place - low)]
 
 
-def reference_pool(points: Array, place: Array, axis: Array, tangent: Array) -> Array:
+def reference_pool(points: Array, place: Array, axis: Array, tangent: Array) -> NDArray[np.complex128]:
     """What is pooled around a place, by the text of the documentation."""
     ball = RADIUS / 4
     support = surfsig.extract(points, ball, voxel=RADIUS / 10, viewpoint=VIEW)

@@ -44,17 +44,23 @@ def test_spacing_is_kept_and_the_scan_is_covered() -> None:
     tree = cKDTree(found.points)
     assert tree.query(found.points, k=2)[0][:, 1].min() >= 0.15
     # A candidate is as near as the spacing; every point has a candidate within a voxel's diagonal.
-    assert tree.query(scan())[0].max() < 0.15 + np.sqrt(3.0) * RADIUS / 4
+    assert tree.query(scan())[0].max() < 0.15 + np.sqrt(3.0) * RADIUS / 8
 
 
-def test_the_number_is_kept_and_all_parts_get_some() -> None:
-    found = surfsig.keypoints(scan(), RADIUS, count=40, viewpoint=VIEW)
-    assert len(found) == 40
+def test_the_number_is_kept_and_the_bumps_get_them_all_over() -> None:
+    found = surfsig.keypoints(scan(), RADIUS, count=60, viewpoint=VIEW)
+    assert len(found) == 60
     assert found.ok.all()
     assert found.indices is not None
     np.testing.assert_array_equal(found.points, scan()[found.indices])
-    cells = np.unique((found.points[:, :2] // 1.0).astype(int), axis=0)
-    assert len(cells) == 8
+    assert np.mean(found.points[:, 0] > 2.0 - RADIUS) > 0.9
+    cells = np.unique((found.points[found.points[:, 0] > 2.0, :2] // 1.0).astype(int), axis=0)
+    assert len(cells) == 4
+
+
+def test_where_many_are_asked_for_flat_places_get_some_too() -> None:
+    found = surfsig.keypoints(scan(), RADIUS, count=100_000, viewpoint=VIEW)
+    assert np.mean(found.points[:, 0] < 2.0 - RADIUS) > 0.3
 
 
 def test_of_keypoints_more_matches_are_right_than_of_random_points() -> None:

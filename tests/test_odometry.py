@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import surfsig
 from surfsig import InvalidInputError, Odometry, PointCloud, ScanStatus, TimedScan, simulate
+from surfsig.odometry.alignment import Scan
 from surfsig.odometry.local_map import LocalMap
 from surfsig.odometry.motion import adjoint, small
 from surfsig.odometry.scale import Scale
@@ -187,6 +188,6 @@ def test_the_map_keeps_the_first_place_of_each_voxel() -> None:
 def test_the_voxel_is_filled_as_often_as_said() -> None:
     points = np.random.default_rng(2).uniform(0, [10.0, 7.0, 0.0], (50_000, 3))
     scale = Scale.of(points, None)
-    assert len(scale.thinned(points)) == pytest.approx(4000, rel=0.02)
+    assert len(Scan(points / scale.voxel, 1)) == pytest.approx(4000, rel=0.02)
     sparse = points[:1000]
-    assert len(Scale.of(sparse, None).thinned(sparse)) == pytest.approx(800, rel=0.02)
+    assert len(Scan(sparse / Scale.of(sparse, None).voxel, 1)) == pytest.approx(800, rel=0.02)

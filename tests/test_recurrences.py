@@ -128,3 +128,12 @@ def test_unknown_viewpoints_and_other_input(scene: RecurrenceScene) -> None:
         surfsig.recurrences([few])  # type: ignore[list-item]
     with pytest.raises(surfsig.InvalidInputError, match="min_points"):
         surfsig.recurrences(surfsig.surfaces(few), min_points=0)
+
+
+def test_without_a_viewpoint_shadows_tell(scene: RecurrenceScene) -> None:
+    blind = surfsig.PointCloud(scene.cloud.offsets)
+    with pytest.warns(UserWarning, match="where shadows point to"):
+        found = surfsig.recurrences(surfsig.surfaces(blind))
+    score = scored(scene, found)
+    assert score.rand_index > 0.7
+    assert not score.merged

@@ -13,9 +13,10 @@ from surfsig.point_cloud import PointCloud
 from surfsig.recurrences.equal_surfaces import equal_surfaces
 from surfsig.recurrences.free_directions import free_directions, free_directions_of_surface
 from surfsig.recurrences.grouping import groups_of, ways_from_first
+from surfsig.recurrences.main_surface import may_be_equal
 from surfsig.recurrences.matching import common_share
 from surfsig.recurrences.pieces import pieces_of, point_spacing
-from surfsig.recurrences.sight import sight_of
+from surfsig.recurrences.shadows import Region, direction_of_sensor, places_without_points, second_place
 from surfsig.surfaces import Surface, Surfaces
 from surfsig.surfaces.surface import described
 
@@ -90,6 +91,26 @@ def test_cones_are_equal_by_their_angle_and_meet_at_their_apex() -> None:
     np.testing.assert_allclose(group.poses[1] @ apex[0], apex[1], atol=1e-12)
 
 
+def test_main_surfaces_that_cannot_be_equal() -> None:
+    can, wide = surface("cylinder", 0.020, 1e-5), surface("cylinder", 0.0205, 1e-5)
+    ball, narrow = surface("sphere", 0.020, 1e-5), surface("sphere", 0.016, 1e-5)
+    frustum, nearly_a_can = (surface("cone", 0.02, 1e-4, half_angle=angle) for angle in (0.3, 0.02))
+    for a, b, equal in (
+        # 2.5 % are what a view of a part may make; 20 % are not.
+        (can, wide, True),
+        (ball, narrow, False),
+        (can, frustum, False),
+        (can, nearly_a_can, True),
+        (frustum, nearly_a_can, False),
+        # An egg may be a sphere on one side.
+        (can, ball, True),
+        (can, None, True),
+    ):
+        assert may_be_equal(a, b) is may_be_equal(b, a) is equal
+    # Errors count where they are large.
+    assert may_be_equal(surface("sphere", 0.020, 1e-3), surface("sphere", 0.016, 1e-3))
+
+
 def directions_of(points: Array, normals: Array) -> list[str]:
     """Name the free directions of oriented points."""
     return [direction.motion for direction in free_directions(points, normals)]
@@ -138,14 +159,20 @@ def test_free_directions_are_named() -> None:
     ]
 
 
-def test_one_false_match_does_not_join_two_groups() -> None:
+def test_groups_hang_together_by_matches_that_their_members_agree_with() -> None:
     scores = np.zeros((6, 6))
-    scores[:3, :3] = scores[3:, 3:] = 0.6
-    scores[0, 3] = scores[3, 0] = 0.7
-    scores[0, 1] = scores[1, 0] = 0.8
-    scores[4, 3] = scores[3, 4] = 0.8
-    assert groups_of(scores, 0.3) == [[0, 1, 2], [3, 4, 5]]
-    assert groups_of(scores[:1, :1], 0.3) == [[0]]
+    for i, j, score in ((0, 1, 0.8), (1, 2, 0.3), (3, 4, 0.8), (4, 5, 0.6), (0, 3, 0.5), (2, 5, 0.1)):
+        scores[i, j] = scores[j, i] = score
+    asked = []
+
+    def agree(first: list[int], second: list[int], match: tuple[int, int]) -> bool:
+        asked.append((first, second, match))
+        return match != (0, 3)
+
+    # 0 and 2 show nothing in common; 0 and 3 match, and others speak against it; 0.1 is no match.
+    assert groups_of(scores, 0.2, agree) == [[0, 1, 2], [3, 4, 5]]
+    assert asked[3] == ([0, 1], [3, 4, 5], (0, 3))
+    assert groups_of(scores[:1, :1], 0.2, agree) == [[0]]
 
 
 def test_poses_are_chained_over_the_best_matches() -> None:
@@ -179,25 +206,45 @@ def test_pieces_are_what_a_support_carries() -> None:
     bricks = [board(6) + np.array([x, y, 2.5]) for x, y in ((5, 5), (40, 8), (20, 40))]
     points = np.concatenate([table, *bricks])
     plane = (np.arange(len(table)), np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.01)
-    pieces, support = pieces_of(points, [plane], point_spacing(points), 20)
+    pieces, supports = pieces_of(points, [plane], point_spacing(points), 20)
     assert [len(piece) for piece in pieces] == [36, 36, 36]
-    np.testing.assert_array_equal(np.flatnonzero(support), np.arange(len(table)))
+    assert supports == [0]
 
 
-def test_a_sensor_sees_what_is_on_hidden_through_and_missing() -> None:
-    """A square in front of a wall, seen from above, with a strip beside it where nothing was measured."""
-    wall, square = board(), board(20) + np.array([10.0, 20.0, 10.0])
-    wall = wall[(wall[:, 0] < 30) | (wall[:, 0] > 36)]
-    points = np.concatenate([wall, square])
-    normals = np.tile([0.0, 0.0, 1.0], (len(points), 1))
-    own = np.arange(len(wall), len(points))
-    sight = sight_of(own, points, normals, np.array([20.0, 30.0, 1e4]), 1.0)
-    # On the square, just below it, far below it; in front of the wall; where nothing was measured.
-    places = np.array([[15, 30, 10.1], [15, 30, 9.0], [15, 30, 2.0], [26, 45, 8.0], [33, 30, 10.0]])
-    judged = sight.judge(places, np.tile([0.0, 0.0, 1.0], (5, 1)), 0.3)
-    confirmed, contradicted, astray, missing = (np.flatnonzero(part).tolist() for part in judged)
-    assert (confirmed, contradicted, astray, missing) == ([0], [3], [1], [4])
-    # A surface that turns its back to the sensor is not seen: neither confirmed nor missing.
-    judged = sight.judge(places[[0, 4]], np.tile([0.0, 0.0, -1.0], (2, 1)), 0.3)
-    assert not judged[0].any()
-    assert not judged[3].any()
+def shadowed(*directions: Array) -> Region:
+    """Make a board 20 above a table, lit along directions: the table lacks what is in a shadow."""
+    table, lid = board(120), board(30) + np.array([50.0, 50.0, 20.0])
+    lit = np.ones(len(table), np.bool_)
+    for direction in directions:
+        # Where the way to the light passes the lid's height.
+        x, y, _ = (table + 20.0 / direction[2] * direction).T
+        lit &= (np.abs(x - 64.5) > 15.0) | (np.abs(y - 64.5) > 15.0)
+    empty = places_without_points(table[lit], 1.0)
+    return Region(np.arange(len(lid)), np.concatenate([lid, table[lit]]), empty, np.array([0.0, 0.0, 1.0]))
+
+
+def unit(*vector: float) -> Array:
+    """Scale to length 1."""
+    scaled = np.asarray(vector, np.float64)
+    return scaled / float(np.linalg.norm(scaled))
+
+
+def angle_between(a: Array, b: Array) -> float:
+    """Give the angle of two vectors in degrees."""
+    return float(np.degrees(np.arccos(np.clip(unit(*a) @ unit(*b), -1.0, 1.0))))
+
+
+def test_shadows_tell_where_the_sensor_was() -> None:
+    light = unit(0.5, -0.3, 1.0)
+    found = direction_of_sensor([shadowed(light)], 1.0)
+    assert found is not None
+    assert angle_between(found, light) < 5.0
+    assert direction_of_sensor([shadowed()], 1.0) is None
+
+
+def test_shadows_tell_a_second_place() -> None:
+    eye, camera = 1e4 * unit(0.1, 0.0, 1.0), 1e4 * unit(0.0, -0.6, 1.0)
+    shift = second_place([shadowed(unit(*eye), unit(*camera))], [eye], 1.0)
+    assert shift is not None
+    assert angle_between(eye + shift, camera) < 5.0
+    assert second_place([shadowed(unit(*eye))], [eye], 1.0) is None

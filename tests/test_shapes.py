@@ -6,17 +6,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.optimize import approx_fprime
 from scipy.stats import t as students_t
 from surface_points import UTM, Array, rotation
 
 import surfsig
 from surfsig import InvalidInputError, PointCloud, fit_cylinder, fit_plane, fit_sphere
-from surfsig.shapes.cylinder import Cylinder
-from surfsig.shapes.plane import Plane
-from surfsig.shapes.sphere import Sphere
-from surfsig.shapes.surface import Surface
-from surfsig.shapes.uncertainty import block_count, block_covariance, spatial_blocks
 
 DRAWS = 300
 
@@ -89,22 +83,6 @@ def test_it_is_the_orthogonal_distance_that_is_least() -> None:
         assert cost(best + step) > cost(best)
 
 
-@pytest.mark.parametrize(
-    "surface",
-    [
-        Sphere(np.array([0.1, 0.2, -0.3]), 0.8),
-        Cylinder(np.array([0.1, -0.2, 0.0]), np.array([0.0, 0.6, 0.8]), 0.7),
-        Plane(np.array([0.0, 0.3, 0.4]), np.array([0.0, 0.6, 0.8])),
-    ],
-)
-def test_jacobians_are_the_derivatives(surface: Surface) -> None:
-    rng = np.random.default_rng(3)
-    points = rng.normal(size=(7, 3))
-    step = 0.1 * rng.normal(size=surface.unknowns)
-    numeric = approx_fprime(step, lambda x: surface.moved(x).distances(points), 1e-7)
-    np.testing.assert_allclose(surface.jacobian(points, step), numeric, atol=1e-6)
-
-
 Draw = Callable[[np.random.Generator, float, float], Array]
 ARCS: list[tuple[Callable[..., surfsig.FittedShape], Draw, float]] = [
     (fit_sphere, sphere, -1.0),
@@ -171,14 +149,25 @@ def independent_error(points: Array, shape: surfsig.FittedShape) -> float:
     return shape.rms * math.sqrt(np.linalg.inv(jacobian.T @ jacobian)[3, 3])
 
 
+def patches_of(points: Array, levels: int) -> NDArray[np.intp]:
+    """Give each point the number of its patch, of 2^levels that are cut across their longest extent."""
+    if not levels:
+        return np.zeros(len(points), np.intp)
+    axis = np.ptp(points, axis=0).argmax()
+    upper = points[:, axis] > np.median(points[:, axis])
+    patches = np.zeros(len(points), np.intp)
+    for half in (False, True):
+        patches[upper == half] = 2 * patches_of(points[upper == half], levels - 1) + half
+    return patches
+
+
 def test_points_that_err_alike_do_not_narrow_the_interval() -> None:
     """The points of a small patch have one error in common: their number says nothing, the blocks do."""
     rng = np.random.default_rng(7)
     inside, naive = [], []
     for _ in range(DRAWS):
         points = sphere(rng, 0.0, count=3000)
-        patches = spatial_blocks(points, 200)
-        points *= 1 + 0.01 * rng.normal(size=200)[patches, None]
+        points *= 1 + 0.01 * rng.normal(size=256)[patches_of(points, 8), None]
         shape = fit_sphere(points)
         inside.append(shape.interval[0] <= 1 <= shape.interval[1])
         naive.append(abs(shape.radius - 1) < 1.96 * independent_error(points, shape))
@@ -233,39 +222,6 @@ def test_intervals_of_lidar_scans_hold_the_radius_far_more_often_than_naive_ones
         naive.append(abs(shape.radius - 0.3) < 1.96 * independent_error(points[shape.inliers], shape))
     assert np.mean(inside) > 0.8
     assert np.mean(naive) < 0.7
-
-
-def test_there_are_fewer_blocks_where_neighbours_err_alike() -> None:
-    rng = np.random.default_rng(16)
-    points = sphere(rng, 0.0)
-    assert block_count(points, rng.normal(size=400)) == 32
-    assert block_count(points, rng.normal(size=50)[spatial_blocks(points, 50)]) < 12
-    assert block_count(points, np.zeros(400)) == 32
-
-
-def test_block_covariance_with_blocks_of_one_point_is_the_known_one() -> None:
-    """With a block for each point it is White's estimator HC2: sum of x x^T r^2 / (1 - leverage)."""
-    rng = np.random.default_rng(9)
-    x, r = rng.normal(size=(40, 3)), rng.normal(size=40)
-    inverse = np.linalg.inv(x.T @ x)
-    leverage = np.einsum("ij,jk,ik->i", x, inverse, x)
-    expected = inverse @ (x.T * (r**2 / (1 - leverage))) @ x @ inverse
-    found, freedom = block_covariance(x, r, np.arange(40))
-    np.testing.assert_allclose(found, expected, rtol=1e-10)
-    # Satterthwaite's: (sum of eigenvalues)^2 / sum of squares, of the quadratic form in the noise.
-    annihilator = np.eye(40) - x @ inverse @ x.T
-    weights = annihilator * (x @ inverse[:, 2] / np.sqrt(1 - leverage))
-    values = np.linalg.eigvalsh(weights.T @ weights)
-    assert freedom == pytest.approx(values.sum() ** 2 / (values**2).sum(), rel=1e-10)
-
-
-def test_blocks_are_neighbours_of_equal_number() -> None:
-    points = np.random.default_rng(10).uniform(size=(1000, 3))
-    labels = spatial_blocks(points, 32)
-    assert set(np.bincount(labels)) <= {31, 32}
-    extents = [np.ptp(points[labels == block], axis=0).max() for block in range(32)]
-    assert max(extents) < 0.6
-    np.testing.assert_array_equal(np.sort(spatial_blocks(points[:7], 32)), np.arange(7))
 
 
 @pytest.mark.parametrize(

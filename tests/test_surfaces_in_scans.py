@@ -2,14 +2,15 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from segmentation_score import Found, TableScore, score_table
+from segmentation_truth import read_tables
 
 import surfsig
 from surfsig import Surface
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*the last line .* is cut off:UserWarning")
-
-NOISY = "surfaces hardly grow where neighbouring points err alike"
 
 
 def found_in(path: Path, kind: str, near: float) -> Surface:
@@ -19,11 +20,15 @@ def found_in(path: Path, kind: str, near: float) -> Surface:
     return min(candidates, key=lambda surface: abs(surface.radius - near))
 
 
-@pytest.mark.xfail(reason=NOISY)
 def test_the_mug(shared_data: Path) -> None:
-    mug = found_in(shared_data / "surfaces" / "table_scene_mug.pcd", "cylinder", 0.039)
-    assert mug.radius == pytest.approx(0.039, abs=0.0015)
-    assert mug.count > 1000
+    """PCL fits 0.0396 to it; towards its foot the camera rounds it off, and it has a handle."""
+    found = surfsig.surfaces(surfsig.read(shared_data / "surfaces" / "table_scene_mug.pcd"))
+    # The largest one is its outside; its inside is another.
+    mug = max((each for each in found if each.kind == "cylinder"), key=lambda each: each.count)
+    assert mug.radius == pytest.approx(0.0396, abs=0.0025)
+    assert abs(mug.axis @ (0, 0.834, 0.552)) > 0.99
+    # All of its outside, not a part.
+    assert mug.count > 6000
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])
@@ -43,8 +48,44 @@ def test_three_scans_of_one_sphere_agree_within_their_intervals(shared_data: Pat
         assert 0.001 < sphere.radius_std < 0.006
 
 
-@pytest.mark.xfail(reason=NOISY)
 def test_the_gym_ball(shared_data: Path) -> None:
+    """Its points are clumps along the lines of sight of a tablet."""
     ball = found_in(shared_data / "surfaces" / "gym_ball.xyz", "sphere", 0.341)
-    assert ball.radius == pytest.approx(0.341, abs=0.005)
-    assert ball.count > 1000
+    assert ball.interval[0] < 0.341 < ball.interval[1]
+    assert ball.radius == pytest.approx(0.341, abs=0.015)
+    assert ball.count > 3000
+
+
+def test_tables_are_not_mixed_nor_in_pieces(shared_data: Path) -> None:
+    scenes = read_tables(shared_data)
+    found = [surfsig.surfaces(scene.cloud) for scene in scenes]
+    total = TableScore.total(
+        score_table(
+            scene, Found(each.labels.astype(np.int64), [s.kind for s in each], [s.radius for s in each])
+        )
+        for scene, each in zip(scenes, found, strict=True)
+    )
+    assert total.unmixed / total.labelled > 0.97
+    assert total.segments / total.objects < 3
+
+
+def test_equal_cans_have_equal_radii(shared_data: Path) -> None:
+    """Two cans stand on one of the tables; nobody says how large they are, but they are of one size."""
+    scene = next(each for each in read_tables(shared_data) if each.name == "learn33")
+    found = surfsig.surfaces(scene.cloud)
+    cans = []
+    for number in (5, 6):
+        labels = found.labels[scene.objects == number]
+        cylinders = [i for i, each in enumerate(found) if each.kind == "cylinder"]
+        largest = max(cylinders, key=lambda i: np.count_nonzero(labels == i))
+        cans.append(found.surfaces[largest])
+    assert 0.03 < cans[0].radius < 0.06
+    assert max(can.interval[0] for can in cans) < min(can.interval[1] for can in cans)
+
+
+def test_what_may_be_a_plane_is_no_sphere(shared_data: Path) -> None:
+    """Part of the clutter behind the mug was a sphere of radius 0.17 +- 0.15."""
+    found = surfsig.surfaces(surfsig.read(shared_data / "surfaces" / "table_scene_mug.pcd"))
+    round_ones = [each for each in found if each.kind in ("sphere", "cylinder")]
+    assert round_ones
+    assert all(each.radius > 2 * each.radius_std for each in round_ones)

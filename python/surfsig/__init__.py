@@ -33,6 +33,7 @@ from surfsig.flat_atom import flat_atom_length
 from surfsig.odometry import Odometry, ScanStatus, odometry
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import Recurrence, Recurrences, recurrences
+from surfsig.registration import Registration, register
 from surfsig.shapes import FittedShape, fit_cylinder, fit_plane, fit_sphere
 from surfsig.similarity import flipped, similarity, similarity_class, similarity_matrix
 from surfsig.surfaces import PointClass, Surface, Surfaces, surfaces
@@ -52,6 +53,7 @@ __all__ = [
     "PointCloud",
     "Recurrence",
     "Recurrences",
+    "Registration",
     "ScanSequence",
     "ScanStatus",
     "Status",
@@ -77,6 +79,7 @@ __all__ = [
     "read",
     "read_trajectory",
     "recurrences",
+    "register",
     "remove_outliers",
     "scan_sequence",
     "similarity",

@@ -7,24 +7,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "FEWEST_SURFACE_POINTS",
     "GOOD",
     "INSTRUCTION_SET",
+    "KIND_PARAMETERS",
     "OPTIMAL",
     "STATUS_NAMES",
+    "DepthImage",
     "E57Reader",
     "Frame",
+    "Primitive",
+    "SurfacePlaces",
     "__version__",
     "extract",
     "field_signatures",
     "find_surfaces",
-    "fit_cylinder",
-    "fit_sphere",
+    "fit_primitive",
     "voxel_representatives",
     "write_e57",
 ]
 
 __version__: str
 STATUS_NAMES: list[str]
+KIND_PARAMETERS: dict[str, int]
+FEWEST_SURFACE_POINTS: int
 INSTRUCTION_SET: str
 OPTIMAL: float
 GOOD: float
@@ -66,8 +72,9 @@ def find_surfaces(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> tuple[NDArray[np.int32], list[dict[str, Any]]]: ...
-def fit_sphere(points: NDArray[np.float64]) -> tuple[list[float], float] | None: ...
-def fit_cylinder(points: NDArray[np.float64]) -> tuple[list[float], list[float], float] | None: ...
+def fit_primitive(
+    points: NDArray[np.float64], kind: str, start: Primitive | None = None
+) -> Primitive | None: ...
 def voxel_representatives(
     points: NDArray[np.floating], *, origin: Sequence[float], voxel: float
 ) -> NDArray[np.uint32]: ...
@@ -80,6 +87,30 @@ def write_e57(
     records: Sequence[tuple[str, str, int, int]],
     scans: Iterable[tuple[str, Sequence[float] | None, Iterable[Sequence[NDArray[Any]]]]],
 ) -> None: ...
+
+@final
+class SurfacePlaces:
+    def __new__(cls, places: NDArray[np.float32], normals: NDArray[np.float32]) -> SurfacePlaces: ...
+
+@final
+class DepthImage:
+    def __new__(
+        cls,
+        points: SurfacePlaces,
+        own: NDArray[np.bool_],
+        *,
+        eye: Sequence[float],
+        spacing: float,
+        reach: float,
+        floors: SurfacePlaces,
+        second: Sequence[float] | None = None,
+    ) -> DepthImage: ...
+    def judge(
+        self, poses: NDArray[np.float64], places: SurfacePlaces, most: int, tolerance: float
+    ) -> NDArray[np.float32]: ...
+    def correspondences(
+        self, pose: NDArray[np.float64], places: SurfacePlaces, most: int, tolerance: float
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]: ...
 
 @final
 class E57Reader:
@@ -120,3 +151,17 @@ class Frame:
     def signatures_of_surfaces(
         self, surfaces: NDArray[np.float32], *, side: float
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]: ...
+
+@final
+class Primitive:
+    @property
+    def point(self) -> NDArray[np.float64]: ...
+    @property
+    def axis(self) -> NDArray[np.float64]: ...
+    @property
+    def radius(self) -> float: ...
+    def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def uncertainty(
+        self, points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]: ...
+    def independent_error(self, points: NDArray[np.float64]) -> float: ...

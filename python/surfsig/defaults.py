@@ -50,8 +50,8 @@ INTERVAL = 0.95
 RECURRENCE_POINTS = 100
 """Fewest points of a piece that is compared with others; with less, little speaks against a match."""
 
-RECURRENCE_SCORE = 0.25
-"""Average score between the pieces of a group, at least."""
+RECURRENCE_SCORE = 0.2
+"""Score of a match, at least; of two kinds in simulated scenes few reach 0.16."""
 
 RECURRENCE_CONFIDENCE = 0.99
 """Of the tests whether surfaces differ in size."""
@@ -62,5 +62,8 @@ RECURRENCE_SEED = 0
 KEYPOINTS = 1000
 """Places that `surfsig.keypoints` chooses, where neither number nor distance is asked for."""
 
-KEYPOINT_CANDIDATES = 4.0
+KEYPOINT_CANDIDATES = 8.0
 """Of them, across a patch's radius, from which it chooses."""
+
+REGISTRATION_KEYPOINTS = 1000
+"""Of each scan that is registered."""

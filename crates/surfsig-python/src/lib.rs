@@ -1,11 +1,12 @@
 //! The bindings: release the interpreter, call the core, map the error; nothing else.
 
+mod depth_image;
 mod e57;
 mod extract;
 mod field;
 mod frame;
+mod primitive;
 mod python_file;
-mod shapes;
 mod surfaces;
 
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
@@ -51,6 +52,8 @@ fn rows<'a, T: numpy::Element, const N: usize>(array: &'a PyReadonlyArray2<'_, T
 #[pymodule]
 mod _surfsig {
     #[pymodule_export]
+    use crate::depth_image::{DepthImage, SurfacePlaces};
+    #[pymodule_export]
     use crate::e57::{E57Reader, write_e57};
     #[pymodule_export]
     use crate::extract::{extract, voxel_representatives};
@@ -59,16 +62,20 @@ mod _surfsig {
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]
-    use crate::shapes::{fit_cylinder, fit_sphere};
+    use crate::primitive::{Primitive, fit_primitive};
     #[pymodule_export]
     use crate::surfaces::find_surfaces;
 
     use pyo3::prelude::*;
+    use pyo3::types::IntoPyDict;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("STATUS_NAMES", surfsig::Status::ALL.map(surfsig::Status::name).to_vec())?;
+        let parameters = surfsig::SurfaceKind::ALL.map(|kind| (kind.name(), kind.parameters()));
+        module.add("KIND_PARAMETERS", parameters.into_py_dict(module.py())?)?;
+        module.add("FEWEST_SURFACE_POINTS", surfsig::FEWEST_SURFACE_POINTS)?;
         module.add("INSTRUCTION_SET", surfsig::InstructionSet::detect().name())?;
         module.add("OPTIMAL", surfsig::OPTIMAL)?;
         module.add("GOOD", surfsig::GOOD)

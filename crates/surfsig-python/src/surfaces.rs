@@ -1,11 +1,11 @@
 //! The surfaces of a scan, for Python.
 
 use crate::extract::{Points, watched};
+use crate::primitive::kind_of;
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods, ToPyArray};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use surfsig::{Monitor, SurfaceKind, SurfaceOptions};
+use surfsig::{Monitor, SurfaceOptions};
 
 /// Find surfaces; see `surfsig.surfaces`. The labels, and a dictionary for each surface.
 #[pyfunction]
@@ -23,9 +23,7 @@ pub fn find_surfaces<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Bound<'py, PyArray1<i32>>, Vec<Bound<'py, PyDict>>)> {
     let cloud = points.cloud(origin)?;
-    let kind = |name: &String| SurfaceKind::ALL.into_iter().find(|kind| kind.name() == name);
-    let kinds: Option<Vec<SurfaceKind>> = kinds.iter().map(kind).collect();
-    let kinds = kinds.ok_or_else(|| PyValueError::new_err("unknown kind"))?;
+    let kinds = kinds.iter().map(|name| kind_of(name)).collect::<PyResult<_>>()?;
     let options = SurfaceOptions { fewest: min_points, noise, kinds, threads };
     let monitor = Monitor::default();
     let report = || -> PyResult<()> {

@@ -27,12 +27,14 @@
 //!
 //! The way of the data, room by room: [`PointCloud`] -> [`CellIndex`] -> [`Moments`] -> paraboloid
 //! ([`FitAxes`]) -> curvature ([`Paraboloid`]) -> [`Frame`] -> [`similarity`]; [`extract()`] walks it.
-//! [`fit_sphere`], [`fit_cylinder`] and [`fit_quadric`] read other surfaces off the same moments.
+//! [`fit_sphere`], [`fit_cylinder`] and [`fit_quadric`] read other surfaces off the same moments, [`fit_primitive`]
+//! fits one by orthogonal distance, and [`find_surfaces`] finds all of a scan.
 
 mod ball;
 mod block_sums;
 mod cell_index;
 mod curvature;
+mod depth_image;
 mod error;
 mod extract;
 mod field;
@@ -42,6 +44,7 @@ mod hierarchy;
 mod members;
 mod moments;
 mod point_cloud;
+mod primitive;
 mod shells;
 mod simd;
 mod similarity;
@@ -50,6 +53,7 @@ mod threads;
 
 pub use cell_index::CellIndex;
 pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
+pub use depth_image::{DepthImage, Judgement, Pose, SurfacePlace};
 pub use error::Error;
 pub use extract::{
     ExtractOptions, Extraction, Monitor, Neighborhood, Queries, Status, extract, extract_auto_radius,
@@ -65,7 +69,8 @@ pub use fit::{
 pub use frame::{Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use point_cloud::{Offsets, PointCloud, Radius};
+pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
 pub use simd::InstructionSet;
 pub use similarity::{GOOD, OPTIMAL, SimilarityClass, similarity};
-pub use surfaces::{FoundSurface, FoundSurfaces, SurfaceKind, SurfaceOptions, find_surfaces};
+pub use surfaces::{FEWEST_SURFACE_POINTS, FoundSurface, FoundSurfaces, SurfaceOptions, find_surfaces};
 pub use threads::with_threads;

@@ -21,6 +21,7 @@ from surfsig.cli.fit import fit_command
 from surfsig.cli.info import info_command
 from surfsig.cli.odometry import odometry_command
 from surfsig.cli.paper import paper_command
+from surfsig.cli.register import register_command
 from surfsig.cli.surfaces import surfaces_command
 from surfsig.errors import SurfsigError
 
@@ -54,6 +55,7 @@ for command in (
     extract_command,
     fit_command,
     surfaces_command,
+    register_command,
     compare_command,
     odometry_command,
     convert_command,

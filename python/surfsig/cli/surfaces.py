@@ -12,7 +12,7 @@ from surfsig.cli.console import on_terminal, print_columns, print_json, progress
 from surfsig.cli.options import CLOUD, input_options, quiet_option, threads_option, words
 
 if TYPE_CHECKING:
-    from surfsig import Surfaces
+    from surfsig import Recurrences, Surfaces
 
 
 @click.command("surfaces", no_args_is_help=True)
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     metavar="KIND,...",
     help="Which to look for: plane, sphere, cylinder, cone, torus.  [default: all]",
 )
+@click.option("--recurrences", is_flag=True, help="Say which objects and surfaces occur more than once, too.")
 @input_options
 @threads_option
 @quiet_option
@@ -57,6 +58,7 @@ def surfaces_command(
     min_points: int | None,
     noise: float | None,
     kinds: list[str] | None,
+    recurrences: bool,
     threads: int | None,
     quiet: bool,
     **reading: Any,
@@ -65,11 +67,14 @@ def surfaces_command(
 
     Nothing needs to be set. The output has the input's points and fields, and surface (its number, -1 for
     none), surface_kind and point_class (1 plane, 2 cylinder, 3 sphere, 4 cone, 5 torus, 6 saddle, 7 edge,
-    8 free form, 0 unknown), confidence (0 to 1), and red, green, blue by surface.
+    8 free form, 0 unknown), confidence (0 to 1), and red, green, blue by surface. With --recurrences it has
+    piece and recurrence, the numbers of what hangs together and of the group of pieces that show the same
+    object (-1 for none), and JSON has their poses.
 
     \b
     Examples:
       surfsig surfaces scan.pcd
+      surfsig surfaces scan.pcd --recurrences
       surfsig surfaces scan.pcd -o labelled.ply --report report.html
       surfsig surfaces part.ply --unit mm --kinds plane,cylinder --json - | jq '.surfaces[].radius'
     """  # noqa: D301
@@ -97,31 +102,40 @@ def surfaces_command(
         )
     if not len(found):
         warnings.warn(f"{file}: {found.summary()}", stacklevel=1)
+    recurring = None
+    if recurrences:
+        with progress_bar("comparing", "pairs", shown=shown) as progress:
+            recurring = surfsig.recurrences(found, progress=progress)
     if output is not None:
         columns = {**found.columns(), "colors": found.colors}
+        if recurring is not None:
+            columns |= {"piece": recurring.labels[0], "recurrence": recurring.group_labels[0]}
         with progress_bar("writing", "points", shown=shown) as progress:
             surfsig.write(output, cloud, columns, progress=progress)
     if report is not None:
         found.write_report(report, title=f"Surfaces of {file.name}")
     if on_stdout:
-        print_json(_values(file, found))
+        print_json(_values(file, found, recurring))
     elif json_file is not None:
-        write_json(json_file, _values(file, found))
+        write_json(json_file, _values(file, found, recurring))
     if len(found) and not on_stdout and not quiet:
         print_columns(f"{file}: {found.summary()}", *found.table())
+    if recurring is not None and not on_stdout and not quiet:
+        print_columns(f"{file}: {recurring.summary()}", *recurring.table())
 
 
-def _values(file: Path, found: Surfaces) -> dict[str, Any]:
+def _values(file: Path, found: Surfaces, recurring: Recurrences | None) -> dict[str, Any]:
     """Give what a program may want to know."""
     import numpy as np
 
     from surfsig import PointClass
 
     counts = np.bincount(found.classes, minlength=len(PointClass)).tolist()
-    return {
+    values = {
         "file": str(file),
         "summary": found.summary(),
         "points": len(found.cloud),
         "classes": {kind.name.lower(): counts[kind] for kind in PointClass},
         "surfaces": [{"number": number, **surface.values()} for number, surface in enumerate(found)],
     }
+    return values if recurring is None else values | {"recurrences": recurring.values()}

@@ -30,17 +30,18 @@ def keypoints(
 ) -> FieldSignatures:
     """Choose places that are distinctive, and spread over the scan.
 
-    Candidates are one point of each voxel of a quarter of the radius. A place is the more distinctive, the
+    Candidates are one point of each voxel of an eighth of the radius. A place is the more distinctive, the
     less its signature is like those of the places most like it, of which all within a radius of it do not
-    count; patches cut off by the scan's rim count for less. Flat places come last.
+    count; patches cut off by the scan's rim count for less. Flat places are taken last.
 
     Parameters
     ----------
     cloud, radius, viewpoint, normals, threads
         As in `field_signatures`.
     count
-        How many, at most; 1,000 by default. Each candidate is as good as its distance to the next one that is
-        more distinctive is large (adaptive non-maximal suppression), so that all parts of the scan get some.
+        How many, at most; 1,000 by default. Of the most distinctive third of the candidates (of more where
+        that is too few) those stay whose distance to the next one that is more distinctive is largest
+        (adaptive non-maximal suppression), so that they are spread.
     spacing
         In place of `count`: the smallest distance between two of them, in the cloud's own unit. All
         candidates are taken, the most distinctive first, that are as far from those before.
@@ -67,8 +68,10 @@ def keypoints(
         return found
     places = found.points - found.points.mean(axis=0)
     order = np.argsort(-_distinctiveness(found, places), kind="stable")
-    chosen = _spread(places[order])[:most] if apart is None else _apart(places[order], apart)
-    return found.take(order[chosen])
+    if apart is not None:
+        return found.take(order[_apart(places[order], apart)])
+    order = order[: max(most, len(order) // 3)]
+    return found.take(order[_spread(places[order])[:most]])
 
 
 def _distinctiveness(found: FieldSignatures, places: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -64,7 +64,17 @@ class FieldSignatures:
         return np.asarray(self.status == Status.OK)
 
     def take(self, places: ArrayLike) -> FieldSignatures:
-        """Return those of some places: numbers, or a mask.
+        """Return those of some places.
+
+        Parameters
+        ----------
+        places
+            Their numbers, (k,), of which negative ones count from the end, or a mask, (m,).
+
+        Returns
+        -------
+        FieldSignatures
+            In the order of the numbers.
 
         Raises
         ------

@@ -8,9 +8,10 @@ import numpy as np
 import small_gicp
 from numpy.typing import NDArray
 
+from surfsig.clean import downsample
 from surfsig.odometry.local_map import LocalMap, prepared
 from surfsig.odometry.motion import moved, orthonormal, small
-from surfsig.shapes.uncertainty import block_count, block_covariance, spatial_blocks
+from surfsig.point_cloud import PointCloud
 
 Array = NDArray[np.float64]
 
@@ -29,6 +30,11 @@ _FLOOR = 0.02
 _HELD = 5e-3
 """Mean square of the heights that the least of all motions makes, below which it is free."""
 _FEWEST = 30
+"""Places that must meet the map."""
+_BLOCKS = 8.0
+"""Blocks along the scan."""
+_FEWEST_BLOCKS = 20
+"""Blocks that tell whether errors are alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,15 +54,21 @@ class Alignment:
 
 
 class Scan:
-    """A scan's places about its sensor, (n, 3), in voxels."""
+    """A scan's points about its sensor, (n, 3), in voxels."""
 
     def __init__(self, points: Array, threads: int) -> None:
-        self.points = points
-        self.cloud, _ = prepared(points, threads)
+        self._points = points
+        self.points = downsample(PointCloud(points), 1.0).points
+        """Its places: the mean of each voxel's points, (m, 3)."""
+        self.cloud, _ = prepared(self.points, threads)
 
     def __len__(self) -> int:
         """Return the number of places."""
         return len(self.points)
+
+    def detail(self) -> Array:
+        """Give the means of voxels of half the size: signatures need more than the pose does."""
+        return downsample(PointCloud(self._points), 0.5).points
 
 
 def align(scan: Scan, around: LocalMap, start: Array, reach: float) -> Alignment | None:
@@ -106,7 +118,7 @@ def align(scan: Scan, around: LocalMap, start: Array, reach: float) -> Alignment
         own = normals[nearest[on]] @ pose[:3, :3]
         design = np.hstack([np.cross(scan.points[on], own), own])
         if step < _LAST_STEPS:
-            change = -np.linalg.lstsq(design, heights[on], rcond=1e-6)[0]
+            change = -np.linalg.lstsq(design.T @ design, design.T @ heights[on], rcond=1e-9)[0]
             pose = orthonormal(pose @ small(change))
     return Alignment(
         pose,
@@ -124,7 +136,17 @@ def _is_held(design: Array) -> bool:
 
 
 def _covariance(design: Array, heights: Array, points: Array) -> Array:
-    """Neighbouring places err alike: blocks of them count as independent, not each."""
-    blocks = spatial_blocks(points, block_count(points, heights))
-    covariance, _ = block_covariance(design, heights, blocks)
-    return covariance
+    """Give the motion's covariance, (6, 6): neighbouring places err alike, so whole blocks of them count.
+
+    Cluster-robust: the heights' part in the motion is summed over each block, and only these sums are
+    independent.
+    """
+    size = float(np.ptp(points, axis=0).max()) / _BLOCKS
+    _, block = np.unique(np.floor(points / size).astype(np.int64), axis=0, return_inverse=True)
+    if int(block.max()) < _FEWEST_BLOCKS:
+        block = np.arange(len(points))
+    gradients = np.zeros((int(block.max()) + 1, 6))
+    np.add.at(gradients, block.ravel(), design * heights[:, None])
+    inverse = np.linalg.pinv(design.T @ design, rcond=1e-12, hermitian=True)
+    spread = gradients.T @ gradients * (len(gradients) / (len(gradients) - 6))
+    return np.asarray(inverse @ spread @ inverse)

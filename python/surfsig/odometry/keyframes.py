@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from surfsig.field import FieldSignatures, keypoints, match_fields
 from surfsig.odometry.alignment import Alignment, Scan, align
-from surfsig.odometry.consensus import agreed_pose
 from surfsig.odometry.local_map import LocalMap
 from surfsig.odometry.motion import inverse, moved, turned_by
 from surfsig.point_cloud import PointCloud
+from surfsig.registration.consensus import Pairs, agreed_pose
 
 Array = NDArray[np.float64]
 
@@ -32,11 +32,15 @@ _REACH = 4.0
 
 @dataclass(eq=False)
 class Keyframe:
-    """A scan that is kept: its pose T_map_scan, its number, and its places; lengths are in voxels."""
+    """A scan that is kept; lengths are in voxels."""
 
     number: int
     pose: Array
+    """T_map_scan."""
     points: NDArray[np.float32]
+    """Its places."""
+    detail: NDArray[np.float32]
+    """More of them, for the signatures."""
     fields: FieldSignatures | None = None
 
 
@@ -55,7 +59,8 @@ class Keyframes:
             near = float(np.linalg.norm(between[:3, 3])) < _APART * self._reach
             if near and turned_by(between) < _TURNED:
                 return
-        self._kept.append(Keyframe(number, pose, scan.points.astype(np.float32)))
+        points, detail = scan.points.astype(np.float32), scan.detail().astype(np.float32)
+        self._kept.append(Keyframe(number, pose, points, detail))
 
     def submap(self, center: Array, distance: float) -> LocalMap:
         """Make a map of the keyframes that were taken within a distance of a place."""
@@ -80,14 +85,16 @@ class Keyframes:
         -------
         Of the poses that matches propose the one that lies best on the keyframes' map, and that map.
         """
-        ours = self._described(scan.points)
+        ours = self._described(scan.detail())
         proposals: list[tuple[int, Array]] = []
         for keyframe in self._kept[: -_SEARCHED - 1 : -1]:
             if keyframe.fields is None:
-                keyframe.fields = self._described(keyframe.points)
-            pose, count = agreed_pose(match_fields(ours, keyframe.fields), ours, keyframe.fields)
-            if count >= _AGREE:
-                proposals.append((count, keyframe.pose @ pose))
+                keyframe.fields = self._described(keyframe.detail)
+            pairs = Pairs.of(match_fields(ours, keyframe.fields), ours, keyframe.fields)
+            pose = agreed_pose(pairs)
+            agree = int(pairs.agreeing(pose).sum())
+            if agree >= _AGREE:
+                proposals.append((agree, keyframe.pose @ pose))
         proposals.sort(key=lambda proposal: -proposal[0])
         best: tuple[Alignment, LocalMap] | None = None
         for _, pose in proposals[:_TRIED]:

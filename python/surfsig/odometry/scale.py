@@ -7,9 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from surfsig.clean import downsample
-from surfsig.point_cloud import PointCloud
-
 Array = NDArray[np.float64]
 
 FEWEST = 50
@@ -40,10 +37,6 @@ class Scale:
         size = _voxel(points) if voxel is None else voxel
         spread = np.linalg.norm(points - np.median(points, axis=0), axis=1)
         return cls(size, float(np.median(np.linalg.norm(points, axis=1))), _PATCH * float(np.median(spread)))
-
-    def thinned(self, points: Array) -> Array:
-        """Give a scan's places: the mean of each voxel, in voxels."""
-        return downsample(PointCloud(points), self.voxel).points / self.voxel
 
 
 def _voxel(points: Array) -> float:

@@ -10,7 +10,8 @@ from surfsig.odometry.alignment import Scan
 from surfsig.odometry.motion import adjoint
 from surfsig.odometry.result import Odometry, ScanStatus
 from surfsig.odometry.scale import FEWEST, Scale
-from surfsig.odometry.tracker import Tracker
+from surfsig.odometry.tracker import Step, Tracker
+from surfsig.point_cloud import PointCloud
 
 Array = NDArray[np.float64]
 
@@ -31,36 +32,48 @@ class Way:
 
     def add(self, scan: TimedScan) -> None:
         """Find the pose of the next scan."""
-        sensor = np.zeros(3) if scan.cloud.viewpoint is None else scan.cloud.viewpoint
-        points = scan.cloud.offsets[scan.cloud.finite] + (scan.cloud.origin - sensor)
-        if self._scale is None and len(points) >= FEWEST and np.ptp(points, axis=0).any():
-            self._scale = scale = Scale.of(points, self._voxel)
-            self._first_sensor = sensor
-            self._tracker = Tracker(
-                scale.reach / scale.voxel,
-                scale.patch / scale.voxel,
-                None if self._map_range is None else self._map_range / scale.voxel,
-                None if self._distance is None else self._distance / scale.voxel,
-                self._threads,
-            )
-        places = points if self._scale is None else self._scale.thinned(points)
-        if self._scale is None or len(places) < FEWEST:
-            if self._scale is not None:
-                self._tracker.skip()
+        step, sensor = self._step(scan.cloud)
+        if step is None:
             nothing = np.full((4, 4), np.nan), np.full((6, 6), np.nan)
             self._steps.append((scan.timestamp, *nothing, ScanStatus.TOO_FEW_POINTS, 0.0))
             return
-        step = self._tracker.follow(Scan(places, self._threads))
+        assert self._scale is not None
+        # From places about the sensor, in voxels, to the scan's own frame and the world's.
         size = self._scale.voxel
         pose = step.pose.copy()
-        # From places about the sensor, in voxels, to the scan's own frame and the world's.
         pose[:3, 3] = size * pose[:3, 3] + self._first_sensor - pose[:3, :3] @ sensor
-        unit = np.repeat([1.0, size], 3)
         to_sensor = np.eye(4)
         to_sensor[:3, 3] = sensor
-        carried = adjoint(to_sensor) * unit
+        carried = adjoint(to_sensor) * np.repeat([1.0, size], 3)
         covariance = carried @ step.covariance @ carried.T
         self._steps.append((scan.timestamp, pose, covariance, step.status, step.overlap))
+
+    def _step(self, cloud: PointCloud) -> tuple[Step | None, Array]:
+        """Follow a scan's points about its sensor, and say where that is; None where they are too few."""
+        sensor = np.zeros(3) if cloud.viewpoint is None else cloud.viewpoint
+        points = cloud.offsets[cloud.finite] + (cloud.origin - sensor)
+        if len(points) >= FEWEST and np.ptp(points, axis=0).any():
+            if self._scale is None:
+                self._begin(points, sensor)
+            assert self._scale is not None
+            places = Scan(points / self._scale.voxel, self._threads)
+            if len(places) >= FEWEST:
+                return self._tracker.follow(places), sensor
+        if self._scale is not None:
+            self._tracker.skip()
+        return None, sensor
+
+    def _begin(self, points: Array, sensor: Array) -> None:
+        """Take the lengths from the first scan."""
+        scale = Scale.of(points, self._voxel)
+        self._scale, self._first_sensor = scale, sensor
+        self._tracker = Tracker(
+            scale.reach / scale.voxel,
+            scale.patch / scale.voxel,
+            None if self._map_range is None else self._map_range / scale.voxel,
+            None if self._distance is None else self._distance / scale.voxel,
+            self._threads,
+        )
 
     def result(self) -> Odometry:
         """Give the way so far."""

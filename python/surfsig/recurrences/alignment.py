@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 _PROPOSALS = 3000
 _FEW, _SOME, _MANY = 60, 240, 600
 """Points of each piece that poses are judged by, from the first proposals to the last search."""
+_ALL = 1 << 40
 _TRIED, _KEPT = 48, 12
 _MUTATIONS = 24
 _TURN, _SHIFT = 0.15, 0.06
@@ -55,28 +56,27 @@ def align(source: View, target: View, rng: np.random.Generator) -> Alignment | N
     poses = proposed_poses(source.pairs, target.pairs, _PROPOSALS, rng)
     if not len(poses):
         return None
-    few = (source.sample(_FEW), target.sample(_FEW))
-    poses, _ = _best(poses, _scores(poses, few, 2.0, _COARSE), _TRIED)
-    some = (source.sample(_SOME), target.sample(_SOME))
-    poses, score = _best(poses, _scores(poses, some, 1.0, _COARSE), _KEPT)
+    views = (source, target)
+    poses, _ = _best(poses, _scores(poses, views, _FEW, 2.0, _COARSE), _TRIED)
+    poses, score = _best(poses, _scores(poses, views, _SOME, 1.0, _COARSE), _KEPT)
     for number in range(_COARSE_ROUNDS):
         poses = _mutated(poses, target, 0.5**number, rng)
-        poses, score = _best(poses, _scores(poses, some, 1.0, _COARSE), _KEPT)
+        poses, score = _best(poses, _scores(poses, views, _SOME, 1.0, _COARSE), _KEPT)
     if score[0] < _HOPELESS:
         return None
-    many = (source.sample(_MANY), target.sample(_MANY))
-    settled = [_settled(pose, many) for pose in poses[: _KEPT // 2]]
+    settled = [_settled(pose, views, _MANY) for pose in poses[: _KEPT // 2]]
     return refined(np.concatenate([poses, settled]), source, target, rng)
 
 
 def refined(poses: Array, source: View, target: View, rng: np.random.Generator) -> Alignment:
     """Search around good poses T_target_source, (k, 4, 4), for the one that both pieces agree with most."""
-    many = (source.sample(_MANY), target.sample(_MANY))
+    views = (source, target)
     for number in range(_FINE_ROUNDS):
-        poses, _ = _best(poses, _scores(poses, many, 1.0, _FINE), max(1, _KEPT >> (1 + number // 2)))
+        scores = _scores(poses, views, _MANY, 1.0, _FINE)
+        poses, _ = _best(poses, scores, max(1, _KEPT >> (1 + number // 2)))
         poses = _mutated(poses, target, 0.5 ** (_COARSE_ROUNDS - 2 + number), rng)
-    poses, _ = _best(poses, _scores(poses, many, 1.0, _FINE), 1)
-    settled = _settled(poses[0], (source, target))
+    poses, _ = _best(poses, _scores(poses, views, _MANY, 1.0, _FINE), 1)
+    settled = _settled(poses[0], views, _ALL)
     return max(
         (measured(pose, source, target) for pose in (poses[0], settled)), key=lambda found: found.score
     )
@@ -84,21 +84,29 @@ def refined(poses: Array, source: View, target: View, rng: np.random.Generator) 
 
 def measured(pose: Array, source: View, target: View) -> Alignment:
     """Judge a pose T_target_source by all points of both pieces."""
-    shares = _shares(pose[None], (source, target), 1.0)[..., 0]
+    shares = _shares(pose[None], (source, target), _ALL, 1.0)[..., 0]
     confirmed, contradicted, astray, missing = shares
     score = float(_agreement(shares, _FINE)) * _weight(pose, source, target)
     return Alignment(pose, confirmed, contradicted, astray, missing, score)
 
 
-def _shares(poses: Array, views: tuple[View, View], looseness: float) -> Array:
+def _shares(poses: Array, views: tuple[View, View], most: int, looseness: float) -> Array:
     """Give the shares (4, 2, poses) of confirmed, contradicted, astray and missing points, there and back."""
-    sides = []
-    for moves, moving, still in ((poses, *views), (np.linalg.inv(poses), *views[::-1])):
-        turned = moves[:, :3, :3].swapaxes(1, 2)
-        places = moving.points @ turned + moves[:, None, :3, 3]
-        judged = still.sight.judge(places, moving.normals @ turned, looseness * still.tolerance)
-        sides.append([part.mean(axis=1) for part in judged])
-    return np.asarray(sides).swapaxes(0, 1)
+    source, target = views
+    sides = [
+        still.image.judge(moves, moving.surface, most, looseness * still.tolerance)
+        for moves, moving, still in ((poses, source, target), (inverse(poses), target, source))
+    ]
+    return np.moveaxis(np.asarray(sides, np.float64), 2, 0)
+
+
+def inverse(poses: Array) -> Array:
+    """Invert poses (..., 4, 4)."""
+    back = np.zeros_like(poses)
+    back[..., :3, :3] = poses[..., :3, :3].swapaxes(-1, -2)
+    back[..., :3, 3] = -np.einsum("...ij,...j->...i", back[..., :3, :3], poses[..., :3, 3])
+    back[..., 3, 3] = 1.0
+    return back
 
 
 def _agreement(shares: Array, penalties: tuple[float, float]) -> Array:
@@ -108,18 +116,17 @@ def _agreement(shares: Array, penalties: tuple[float, float]) -> Array:
 
 
 def _scores(
-    poses: Array, views: tuple[View, View], looseness: float, penalties: tuple[float, float]
+    poses: Array, views: tuple[View, View], most: int, looseness: float, penalties: tuple[float, float]
 ) -> Array:
-    return _agreement(_shares(poses, views, looseness), penalties)
+    return _agreement(_shares(poses, views, most, looseness), penalties)
 
 
 def _weight(pose: Array, source: View, target: View) -> float:
     """Give what the confirmed part of a match counts: less where it is one plane."""
-    places, normals = _placed(pose, source)
-    confirmed = normals[target.sight.judge(places, normals, target.tolerance)[0]]
-    if not len(confirmed):
+    _, _, normals = target.image.correspondences(pose, source.surface, _ALL, target.tolerance)
+    if not len(normals):
         return 0.0
-    spread = 1.0 - float(np.linalg.eigvalsh(confirmed.T @ confirmed / len(confirmed))[-1])
+    spread = 1.0 - float(np.linalg.eigvalsh(normals.T @ normals / len(normals))[-1])
     return _FLAT + (1.0 - _FLAT) * min(spread / _ROUND, 1.0)
 
 
@@ -132,14 +139,12 @@ def _mutated(poses: Array, target: View, step: float, rng: np.random.Generator) 
     """Give the poses, and each turned about the target's middle and shifted at random."""
     count = len(poses) * _MUTATIONS
     motion = np.tile(np.eye(4), (count, 1, 1))
-    turn = Rotation.from_rotvec(rng.normal(0.0, _TURN * step, (count, 3))).as_matrix()
-    shift = rng.normal(0.0, _SHIFT * step * target.extent, (count, 3))
-    motion[:, :3, :3] = turn
-    motion[:, :3, 3] = target.middle - turn @ target.middle + shift
+    motion[:, :3, :3] = Rotation.from_rotvec(rng.normal(0.0, _TURN * step, (count, 3))).as_matrix()
+    motion[:, :3, 3] = rng.normal(0.0, _SHIFT * step * target.extent, (count, 3))
     return np.concatenate([poses, motion @ np.repeat(poses, _MUTATIONS, axis=0)])
 
 
-def _settled(pose: Array, views: tuple[View, View]) -> Array:
+def _settled(pose: Array, views: tuple[View, View], most: int) -> Array:
     """Refine a pose by point-to-plane least squares over the confirmed points, there and back.
 
     The correspondences are those of the depth images. Where the points leave a direction free (along a
@@ -147,38 +152,32 @@ def _settled(pose: Array, views: tuple[View, View]) -> Array:
     """
     source, target = views
     for _ in range(_SETTLING):
-        moved, normals = _placed(pose, source)
-        kept, foot, normal = target.sight.correspondences(moved, normals, target.tolerance)
-        rows = [_row(moved[kept], normal[kept])]
-        heights = [np.einsum("ij,ij->i", moved - foot, normal)[kept]]
-        back, normals = _placed(np.asarray(np.linalg.inv(pose)), target)
-        kept, foot, normal = source.sight.correspondences(back, normals, source.tolerance)
-        normal = normal[kept] @ pose[:3, :3].T
+        turn, shift = pose[:3, :3], pose[:3, 3]
+        kept, foot, normal = target.image.correspondences(pose, source.surface, most, target.tolerance)
+        moved = source.points[kept] @ turn.T + shift
+        rows = [_row(moved / target.extent, normal)]
+        heights = [np.einsum("ij,ij->i", moved - foot, normal)]
+        back = inverse(pose)
+        kept, foot, normal = source.image.correspondences(back, target.surface, most, source.tolerance)
+        normal = normal @ turn.T
         # The target's point stays and the source's surface moves: the opposite sign.
-        rows.append(_row(target.points[kept], normal))
-        offset = target.points[kept] - (foot[kept] @ pose[:3, :3].T + pose[:3, 3])
-        heights.append(-np.einsum("ij,ij->i", offset, normal))
+        rows.append(_row(target.points[kept] / target.extent, normal))
+        heights.append(np.einsum("ij,ij->i", foot @ turn.T + shift - target.points[kept], normal))
         design, height = np.concatenate(rows), np.concatenate(heights)
         if len(design) < 6:
             break
-        middle, unit = target.middle, target.extent
-        # About the middle and in units of the extent, so that turns and shifts are alike.
-        design[:, :3] = (design[:, :3] - np.cross(middle, design[:, 3:])) / unit
-        change, *_ = np.linalg.lstsq(design, -height, rcond=_FREE)
-        turn = Rotation.from_rotvec(change[:3] / unit).as_matrix()
+        values, vectors = np.linalg.eigh(design.T @ design)
+        inverted = np.where(values > _FREE**2 * values[-1], 1.0 / np.maximum(values, 1e-300), 0.0)
+        change = -vectors @ (inverted * (vectors.T @ (design.T @ height)))
         motion = np.eye(4)
-        motion[:3, :3] = turn
-        motion[:3, 3] = middle - turn @ middle + change[3:]
+        motion[:3, :3] = Rotation.from_rotvec(change[:3] / target.extent).as_matrix()
+        motion[:3, 3] = change[3:]
         pose = motion @ pose
     return pose
 
 
 _FREE = 0.03
 """Of the largest singular value; directions below it are left alone."""
-
-
-def _placed(pose: Array, view: View) -> tuple[Array, Array]:
-    return view.points @ pose[:3, :3].T + pose[:3, 3], view.normals @ pose[:3, :3].T
 
 
 def _row(points: Array, normals: Array) -> Array:

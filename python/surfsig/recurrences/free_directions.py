@@ -6,7 +6,7 @@ Gelfand, Guibas: Shape segmentation using local slippage analysis (SGP 2004).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,13 @@ class FreeDirection:
         if self.motion == "turn":
             return f"turns about the axis {_text(self.axis)} through {_text(self.point)}"
         return f"slides along {_text(self.axis)}"
+
+    def values(self) -> dict[str, Any]:
+        """Give motion, axis and point as plain numbers; without axis or point where there is none."""
+        known = {"axis": self.axis, "point": self.point}
+        return {"motion": self.motion} | {
+            name: vector.tolist() for name, vector in known.items() if not np.isnan(vector).any()
+        }
 
 
 def free_directions_of_surface(kind: str, point: Array, axis: Array) -> list[FreeDirection]:

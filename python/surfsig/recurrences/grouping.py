@@ -2,37 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.cluster.hierarchy import fcluster, linkage
-from scipy.spatial.distance import squareform
 
 Array = NDArray[np.float64]
 
 
-def groups_of(scores: Array, least: float) -> list[list[int]]:
-    """Group what matches: average linkage, so that one false match does not join two kinds.
+def groups_of(
+    scores: Array, least: float, agree: Callable[[list[int], list[int], tuple[int, int]], bool]
+) -> list[list[int]]:
+    """Group what matches, the best matches first.
+
+    Two views of an object need not show any surface in common, so a group hangs together by single matches;
+    that a false one does not join two kinds is what `agree` is for.
 
     Parameters
     ----------
     scores
         (n, n), symmetric, 1 for certain and 0 for no match.
     least
-        Average score between the members of a group.
+        Score of a match.
+    agree
+        Given the members of two groups and the match between them, whether all members agree with it.
 
     Returns
     -------
     Members ascending, groups by their first ones; single ones are groups, too.
     """
-    count = len(scores)
-    if count < 2:
-        return [[number] for number in range(count)]
-    distances = 1.0 - scores
-    np.fill_diagonal(distances, 0.0)
-    tree = linkage(squareform(distances, checks=False), method="average")
-    label = fcluster(tree, 1.0 - least, criterion="distance")
-    groups = [np.flatnonzero(label == value).tolist() for value in np.unique(label)]
-    return sorted(groups, key=lambda members: int(members[0]))
+    group_of = {number: [number] for number in range(len(scores))}
+    rows, columns = np.triu_indices(len(scores), 1)
+    for at in np.argsort(-scores[rows, columns], kind="stable"):
+        i, j = int(rows[at]), int(columns[at])
+        if scores[i, j] < least:
+            break
+        if group_of[i] is not group_of[j] and agree(group_of[i], group_of[j], (i, j)):
+            together = sorted(group_of[i] + group_of[j])
+            group_of |= dict.fromkeys(together, together)
+    return [members for number, members in sorted(group_of.items()) if members[0] == number]
 
 
 def ways_from_first(members: list[int], scores: Array) -> list[tuple[int, int]]:

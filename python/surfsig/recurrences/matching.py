@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surfsig.recurrences.alignment import Alignment, align, refined
+from surfsig.recurrences.alignment import Alignment, align, inverse, measured, refined
+from surfsig.recurrences.grouping import ways_from_first
+from surfsig.recurrences.main_surface import may_be_equal
 from surfsig.recurrences.view import View
+from surfsig.surfaces import Surface
 
 Array = NDArray[np.float64]
 
@@ -22,6 +26,10 @@ _DOUBTFUL = 0.5
 _DETOURS = 3
 _WORTHWHILE = 0.25
 """Scores from which on an alignment is good for a detour."""
+_AGAINST = -0.15
+"""Scores below which a chained pose speaks against a match."""
+_MAJORITY = 0.6
+"""Share of chained poses that must not."""
 
 Pairs = dict[tuple[int, int], Alignment]
 """Alignments of the pairs (source, target), source < target, that match at all."""
@@ -30,7 +38,9 @@ Pairs = dict[tuple[int, int], Alignment]
 def matched_pairs(
     views: Sequence[View],
     signatures: Sequence[Array],
+    mains: Sequence[Surface | None],
     seed: int,
+    threads: int | None,
     progress: Callable[[int, int], object] | None,
 ) -> Pairs:
     """Align all pairs of pieces whose signatures are alike.
@@ -41,22 +51,32 @@ def matched_pairs(
         The pieces.
     signatures
         Of each some signatures, (k, 243).
+    mains
+        Of each the surface that most of it is.
     seed
         Of the searches.
+    threads
+        How many work; None for one for each core, and some.
     progress
         Called with the pairs done, and of all.
     """
-    pairs: Pairs = {}
-    count = len(views) * (len(views) - 1) // 2
     numbers = [(i, j) for j in range(len(views)) for i in range(j)]
-    for done, (i, j) in enumerate(numbers):
-        if common_share(signatures[i], signatures[j]) >= _ALIKE:
-            found = align(views[i], views[j], np.random.default_rng([seed, i, j]))
+
+    def matched(pair: tuple[int, int]) -> Alignment | None:
+        i, j = pair
+        if not may_be_equal(mains[i], mains[j]) or common_share(signatures[i], signatures[j]) < _ALIKE:
+            return None
+        return align(views[i], views[j], np.random.default_rng([seed, i, j]))
+
+    pairs: Pairs = {}
+    # Each pair has its own generator: the result does not depend on the number of threads.
+    with ThreadPoolExecutor(threads) as pool:
+        for done, (pair, found) in enumerate(zip(numbers, pool.map(matched, numbers), strict=True)):
             if found is not None:
-                pairs[i, j] = found
-        if progress is not None:
-            progress(done + 1, count)
-    _take_detours(pairs, views, seed)
+                pairs[pair] = found
+            if progress is not None:
+                progress(done + 1, len(numbers))
+    _take_detours(pairs, views, mains, seed)
     return pairs
 
 
@@ -77,7 +97,7 @@ def pose_between(pairs: Pairs, source: int, target: int) -> Array:
     """Give the pose T_target_source of a pair in either order."""
     if (source, target) in pairs:
         return pairs[source, target].pose
-    return np.asarray(np.linalg.inv(pairs[target, source].pose))
+    return inverse(pairs[target, source].pose)
 
 
 def scores_of(pairs: Pairs, count: int) -> Array:
@@ -88,12 +108,49 @@ def scores_of(pairs: Pairs, count: int) -> Array:
     return scores
 
 
-def _take_detours(pairs: Pairs, views: Sequence[View], seed: int) -> None:
+def agreement_of(
+    pairs: Pairs, views: Sequence[View]
+) -> Callable[[list[int], list[int], tuple[int, int]], bool]:
+    """Give what tells whether the members of two groups agree with a match between them (see `groups_of`).
+
+    The poses between members are chained over the match. Most of them must not speak against it: a pose
+    that is seen to be wrong is, far more often than not, one between objects that differ.
+    """
+
+    def agree(first: list[int], second: list[int], match: tuple[int, int]) -> bool:
+        i, j = match
+        between = pose_between(pairs, i, j)
+        scores = scores_of(pairs, len(views))
+        onward = poses_from(j, second, pairs, scores)
+        back = poses_from(i, first, pairs, scores)
+        found = [
+            max(
+                measured(onward[b] @ between @ inverse(back[a]), views[a], views[b]).score,
+                scores[a, b],
+            )
+            for a in first
+            for b in second
+        ]
+        return float(np.mean(np.asarray(found) >= _AGAINST)) >= _MAJORITY
+
+    return agree
+
+
+def poses_from(start: int, members: list[int], pairs: Pairs, scores: Array) -> dict[int, Array]:
+    """Chain the poses T_member_start of a group over its best matches."""
+    poses = {start: np.eye(4)}
+    order = [start, *(member for member in members if member != start)]
+    for known, new in ways_from_first(order, scores):
+        poses[new] = pose_between(pairs, known, new) @ poses[known]
+    return poses
+
+
+def _take_detours(pairs: Pairs, views: Sequence[View], mains: Sequence[Surface | None], seed: int) -> None:
     """Try, for doubtful pairs, the poses by way of third pieces that match both well."""
     scores = scores_of(pairs, len(views))
     for j in range(len(views)):
         for i in range(j):
-            if scores[i, j] >= _DOUBTFUL:
+            if scores[i, j] >= _DOUBTFUL or not may_be_equal(mains[i], mains[j]):
                 continue
             both = np.minimum(scores[i], scores[j])
             via = [k for k in np.argsort(-both, kind="stable")[:_DETOURS] if both[k] >= _WORTHWHILE]

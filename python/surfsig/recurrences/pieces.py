@@ -31,7 +31,7 @@ def pieces_of(
     planes: Sequence[tuple[NDArray[np.int64], Array, Array, float]],
     spacing: float,
     fewest: int,
-) -> tuple[list[NDArray[np.int64]], NDArray[np.bool_]]:
+) -> tuple[list[NDArray[np.int64]], list[int]]:
     """Cut a scan into pieces.
 
     Parameters
@@ -47,18 +47,22 @@ def pieces_of(
 
     Returns
     -------
-    The points' numbers of each piece, ascending, by their first ones; and which points are of supports, (n,).
+    The points' numbers of each piece, ascending, by their first ones; and the numbers of the planes that are
+    supports, the largest first.
     """
     links = cKDTree(points).query_pairs(_LINK * spacing, output_type="ndarray")
     support = np.zeros(len(points), np.bool_)
-    for members, place, normal, noise in sorted(planes, key=lambda plane: -_extent(points[plane[0]])):
+    supports = []
+    for number in sorted(range(len(planes)), key=lambda number: -_extent(points[planes[number][0]])):
+        members, place, normal, noise = planes[number]
         if _carries(points, members, support, links, fewest):
+            supports.append(number)
             reach = max(_THICKNESS * noise, 0.5 * spacing)
             # Edges of the plane's own growth, and points that objects touch it with.
             support[members] = True
             support |= np.abs((points - place) @ normal) <= reach
     free = np.flatnonzero(~support)
-    return _connected(len(points), free, links, fewest), support
+    return _connected(len(points), free, links, fewest), supports
 
 
 def _extent(points: Array) -> float:

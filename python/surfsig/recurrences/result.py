@@ -89,14 +89,105 @@ class Recurrences:
         return self.groups[number]
 
     def __repr__(self) -> str:
-        recurring = sum(len(group) for group in self.groups)
         lines = [
-            f"Recurrences({recurring} of {len(self.pieces)} pieces in {len(self.groups)} groups, "
-            f"{len(self.equal_surfaces)} sizes of equal surfaces)",
+            f"Recurrences({self.summary()})",
             *(f"  {number}: {group!r}" for number, group in enumerate(self.groups)),
             *(f"  {surfaces!r}" for surfaces in self.equal_surfaces),
         ]
         return "\n".join(lines)
+
+    def summary(self) -> str:
+        """Say in words how much recurs.
+
+        Returns
+        -------
+        str
+            For instance "28 of 30 pieces in 8 groups, 5 sizes of equal surfaces".
+        """
+        recurring = sum(len(group) for group in self.groups)
+        return (
+            f"{recurring} of {len(self.pieces)} pieces in {len(self.groups)} groups, "
+            f"{len(self.equal_surfaces)} sizes of equal surfaces"
+        )
+
+    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Describe groups of pieces, and then of equal surfaces, for people.
+
+        Returns
+        -------
+        The names of the columns, and a row for each group: its number, what recurs, how often, the numbers of
+        the pieces or surfaces, the mean score or the size with its standard error, the free directions.
+        """
+        several = len(self.labels) > 1
+        rows = []
+        for number, group in enumerate(self.groups):
+            members = [(self.pieces[piece].scan, piece) for piece in group.pieces]
+            score = f"score {group.scores[1:].mean():.2f}"
+            rows.append((f"{number}", "piece", members, score, group.free_directions))
+        for surfaces in self.equal_surfaces:
+            size = ", ".join(
+                f"{name.replace('_', ' ')} {value:.4g} ± {surfaces.size_std[name]:.1g}"
+                for name, value in surfaces.size.items()
+            )
+            rows.append(("", surfaces.kind, surfaces.members, size, surfaces.free_directions))
+        header = ("", "what", "times", "which", "how alike", "free directions")
+        return header, [
+            (
+                label,
+                what,
+                str(len(members)),
+                " ".join(f"{scan}:{which}" if several else f"{which}" for scan, which in members),
+                alike,
+                "; ".join(map(str, free)) or "none",
+            )
+            for label, what, members, alike, free in rows
+        ]
+
+    def values(self) -> dict[str, Any]:
+        """Give groups with members, poses and free directions as plain numbers, lists and dictionaries.
+
+        Returns
+        -------
+        dict
+            pieces (number, scan, points, surfaces, center); groups (members with piece, score and pose, which
+            is T_member_first row by row; free_directions); equal_surfaces (kind, size, size_std, members
+            with scan, surface and pose; free_directions).
+        """
+        return {
+            "pieces": [
+                {
+                    "number": number,
+                    "scan": piece.scan,
+                    "points": len(piece.points),
+                    "surfaces": piece.surfaces,
+                    "center": piece.center.tolist(),
+                }
+                for number, piece in enumerate(self.pieces)
+            ],
+            "groups": [
+                {
+                    "members": [
+                        {"piece": piece, "score": float(score), "pose": pose.tolist()}
+                        for piece, score, pose in zip(group.pieces, group.scores, group.poses, strict=True)
+                    ],
+                    "free_directions": [direction.values() for direction in group.free_directions],
+                }
+                for group in self.groups
+            ],
+            "equal_surfaces": [
+                {
+                    "kind": surfaces.kind,
+                    "size": surfaces.size,
+                    "size_std": surfaces.size_std,
+                    "members": [
+                        {"scan": scan, "surface": number, "pose": pose.tolist()}
+                        for (scan, number), pose in zip(surfaces.members, surfaces.poses, strict=True)
+                    ],
+                    "free_directions": [direction.values() for direction in surfaces.free_directions],
+                }
+                for surfaces in self.equal_surfaces
+            ],
+        }
 
     def to_pandas(self) -> pd.DataFrame:
         """Give the pieces that recur as a pandas DataFrame, a row each; the index has the pieces' numbers.

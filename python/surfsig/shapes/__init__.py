@@ -5,17 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from surfsig import _surfsig
 from surfsig.arguments import positive_length
 from surfsig.clean import COORDINATE_LIMIT
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud, position_array
-from surfsig.shapes.cylinder import Cylinder
 from surfsig.shapes.fitted import FittedShape, fitted_shape
 from surfsig.shapes.growth import grown
-from surfsig.shapes.orthogonal import determined, frame_of, settled
-from surfsig.shapes.plane import Plane
-from surfsig.shapes.sphere import Sphere
-from surfsig.shapes.surface import Surface
+from surfsig.shapes.robust import Kind, settled
 
 __all__ = ["FittedShape", "fit_cylinder", "fit_plane", "fit_sphere"]
 
@@ -62,7 +59,7 @@ def fit_sphere(
     InvalidInputError
         If the points are too few, or determine no sphere; or an argument has no meaning.
     """
-    return _fit(Sphere, cloud, near, radius, robust)
+    return _fit("sphere", cloud, near, radius, robust)
 
 
 def fit_cylinder(
@@ -89,7 +86,7 @@ def fit_cylinder(
     InvalidInputError
         As `fit_sphere`.
     """
-    return _fit(Cylinder, cloud, near, radius, robust)
+    return _fit("cylinder", cloud, near, radius, robust)
 
 
 def fit_plane(
@@ -116,11 +113,11 @@ def fit_plane(
     InvalidInputError
         As `fit_sphere`.
     """
-    return _fit(Plane, cloud, near, radius, robust)
+    return _fit("plane", cloud, near, radius, robust)
 
 
 def _fit(
-    kind: type[Surface],
+    kind: Kind,
     data: PointCloud | ArrayLike,
     place: ArrayLike | None,
     radius: float | None,
@@ -128,28 +125,23 @@ def _fit(
 ) -> FittedShape:
     cloud = PointCloud.of(data)
     finite = cloud.finite
-    offsets = cloud.offsets[finite].astype(np.float64)
-    if len(offsets) <= kind.unknowns:
-        raise InvalidInputError(
-            f"a {kind.kind} takes at least {kind.unknowns + 1} points, not {len(offsets)}"
-        )
-    if not (np.abs(offsets) <= COORDINATE_LIMIT).all():
+    points = cloud.offsets[finite].astype(np.float64)
+    unknowns = _surfsig.KIND_PARAMETERS[kind]
+    if len(points) <= unknowns:
+        raise InvalidInputError(f"a {kind} takes at least {unknowns + 1} points, not {len(points)}")
+    if not (np.abs(points) <= COORDINATE_LIMIT).all():
         raise InvalidInputError(f"coordinates must be within {COORDINATE_LIMIT:g} for a fit")
     if radius is not None and place is None:
         raise InvalidInputError("radius is that of the ball around near: give near, too")
-    # Near 0 and of an extent near 1 nothing is lost to rounding.
-    middle, unit = frame_of(offsets)
-    points = (offsets - middle) / unit
     if place is None:
         found = settled(kind, points, robust=robust)
     else:
-        start = None if radius is None else positive_length(radius, "radius") / unit
-        spot = (position_array(place, "near") - cloud.origin - middle) / unit
-        found = grown(kind, points, spot, start)
-    if found is None or not determined(found[0], points[found[1]]):
+        start = None if radius is None else positive_length(radius, "radius")
+        found = grown(kind, points, position_array(place, "near") - cloud.origin, start)
+    if found is None:
         where = "" if place is None else " near that place"
-        raise InvalidInputError(f"the points{where} determine no {kind.kind}")
+        raise InvalidInputError(f"the points{where} determine no {kind}")
     surface, chosen = found
     inliers = np.zeros(len(cloud), np.bool_)
     inliers[np.flatnonzero(finite)[chosen]] = True
-    return fitted_shape(surface.placed(unit, middle), cloud, inliers)
+    return fitted_shape(kind, surface, cloud, inliers)

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig import _surfsig
 from surfsig.defaults import INTERVAL
 from surfsig.point_cloud import PointCloud
-from surfsig.shapes.orthogonal import frame_of
-from surfsig.shapes.surface import Array, Kind, Surface
-from surfsig.shapes.uncertainty import covariance_of
+from surfsig.shapes.robust import Array, Kind
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,29 +70,39 @@ class FittedShape:
         )
 
 
-def fitted_shape(surface: Surface, cloud: PointCloud, inliers: NDArray[np.bool_]) -> FittedShape:
+def fitted_shape(
+    kind: Kind, surface: _surfsig.Primitive, cloud: PointCloud, inliers: NDArray[np.bool_]
+) -> FittedShape:
     """Describe a surface, in the coordinates of a cloud's offsets, that was fitted to some of its points."""
-    middle, unit = frame_of(cloud.offsets[inliers].astype(np.float64))
-    # About the mean of the points that count, so that the center is next to it; the step of 0 sees to that.
-    local = surface.placed(1 / unit, -middle / unit).moved(np.zeros(surface.unknowns))
-    points = (cloud.offsets - middle) / unit
-    residuals = local.distances(points)
-    counted = residuals[inliers]
-    covariance, freedom = covariance_of(local, points[inliers])
-    embedding = local.embedding()
-    # Lengths are in units of the extent, an axis in none.
-    embedding[:3] *= unit
-    if not np.isnan(local.radius):
-        embedding[-1] *= unit
-    placed = local.placed(unit, cloud.origin + middle)
+    points = cloud.offsets.astype(np.float64)
+    residuals = surface.distances(points)
+    covariance, across, freedom = surface.uncertainty(points[inliers])
+    embedding = _embedding(kind, surface.axis, across)
     return FittedShape(
-        kind=local.kind,
-        center=placed.center,
-        axis=placed.axis,
-        radius=placed.radius,
+        kind=kind,
+        center=surface.point + cloud.origin,
+        axis=None if kind == "sphere" else surface.axis,
+        radius=surface.radius,
         covariance=embedding @ covariance @ embedding.T,
         degrees_of_freedom=freedom,
-        rms=unit * float(np.sqrt((counted**2).mean())),
-        residuals=unit * residuals,
+        rms=float(np.sqrt((residuals[inliers] ** 2).mean())),
+        residuals=residuals,
         inliers=inliers,
     )
+
+
+def _embedding(kind: Kind, axis: Array, across: Array) -> Array:
+    """Give the derivatives of center, axis and radius, those that the shape has, by the core's parameters."""
+    if kind == "sphere":
+        return np.eye(4)
+    if kind == "plane":
+        # Shift along the normal, and its tilts.
+        embedding = np.zeros((6, 3))
+        embedding[:3, 0] = axis
+        embedding[3:, 1:] = across.T
+        return embedding
+    # Shifts of the axis, its tilts, and the radius.
+    embedding = np.zeros((7, 5))
+    embedding[:3, :2] = embedding[3:6, 2:4] = across.T
+    embedding[6, 4] = 1.0
+    return embedding

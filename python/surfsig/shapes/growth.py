@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surfsig.shapes.orthogonal import MAX_PASSES, near, refined, settled
-from surfsig.shapes.surface import Array, Surface
-from surfsig.shapes.uncertainty import covariance_of
+from surfsig import _surfsig
+from surfsig.shapes.robust import MAX_PASSES, Array, Kind, near, rounding_of, settled
 
 Mask = NDArray[np.bool_]
 
@@ -39,11 +38,11 @@ _FINEST = 2.0**-20
 class Grown(NamedTuple):
     """A surface, and which points it was fitted to, (n,)."""
 
-    surface: Surface
+    surface: _surfsig.Primitive
     inliers: Mask
 
 
-def grown(kind: type[Surface], points: Array, place: Array, radius: float | None) -> Grown | None:
+def grown(kind: Kind, points: Array, place: Array, radius: float | None) -> Grown | None:
     """Fit a shape to the points around a place, then to all that are near its surface, until they stand.
 
     Without a radius, ever more of the nearest points are tried, until two starts lead to the same shape.
@@ -99,9 +98,7 @@ def _starts(points: Array, place: Array, radius: float | None) -> Iterator[NDArr
         count *= 2
 
 
-def _from_seeds(kind: type[Surface], points: Array, seeds: NDArray[np.intp]) -> Grown | None:
-    if len(seeds) <= kind.unknowns:
-        return None
+def _from_seeds(kind: Kind, points: Array, seeds: NDArray[np.intp]) -> Grown | None:
     start = settled(kind, points[seeds], robust=True)
     if start is None:
         return None
@@ -110,29 +107,24 @@ def _from_seeds(kind: type[Surface], points: Array, seeds: NDArray[np.intp]) -> 
     chosen[seeds[kept]] = True
     if not _stands_out(surface, points[chosen]):
         return None
-    shape = _spread(surface, points, chosen)
+    shape = _spread(kind, surface, points, chosen)
     return shape if shape and _stands_out(shape.surface, points[shape.inliers]) else None
 
 
-def _stands_out(surface: Surface, points: Array) -> bool:
+def _stands_out(surface: _surfsig.Primitive, points: Array) -> bool:
     """Tell whether points say how large the surface is, by the error that their number alone promises."""
-    if len(points) <= surface.unknowns:
-        return False
     if np.isnan(surface.radius):
         return True
-    residuals = surface.distances(points)
-    variance = residuals @ residuals / (len(points) - surface.unknowns)
-    # The last unknown's variance, that of the radius, is one over the square of the triangle's last entry.
-    last = abs(np.linalg.qr(surface.jacobian(points, np.zeros(surface.unknowns)))[1][-1, -1])
-    rms = np.sqrt(variance)
-    return bool(rms < _DETERMINED * surface.radius * last and rms < _THIN * surface.radius)
+    rms = np.sqrt((surface.distances(points) ** 2).mean())
+    error = surface.independent_error(points)
+    return bool(error < _DETERMINED * surface.radius and rms < _THIN * surface.radius)
 
 
 def _relative_error(shape: Grown, points: Array) -> float:
     """Give the radius's standard error over the radius; 0 for a plane, infinity where it is not known."""
     if np.isnan(shape.surface.radius):
         return 0.0
-    variance = covariance_of(shape.surface, points[shape.inliers])[0][-1, -1]
+    variance = shape.surface.uncertainty(points[shape.inliers])[0][-1, -1]
     return float(np.sqrt(variance)) / shape.surface.radius if np.isfinite(variance) else np.inf
 
 
@@ -140,13 +132,14 @@ def _same(a: Mask, b: Mask) -> bool:
     return bool((a & b).sum() > _SAME * (a | b).sum())
 
 
-def _spread(surface: Surface, points: Array, chosen: Mask) -> Grown | None:
+def _spread(kind: Kind, surface: _surfsig.Primitive, points: Array, chosen: Mask) -> Grown | None:
     """Take the points near the surface that hang together with those chosen, and fit it again, to the end."""
     # A few points may miss the gaps between a scanner's lines.
     cell = 2 * _longest_gap(points[chosen])
+    rounding = rounding_of(points)
     for _ in range(MAX_PASSES):
         distances = surface.distances(points)
-        candidates = np.flatnonzero(near(distances, distances[chosen]))
+        candidates = np.flatnonzero(near(distances, distances[chosen], rounding))
         if not len(candidates):
             return None
         parts = _parts(points[candidates], cell)
@@ -160,7 +153,7 @@ def _spread(surface: Surface, points: Array, chosen: Mask) -> Grown | None:
                 break
             cell = gap
             continue
-        again = refined(surface, points[new])
+        again = _surfsig.fit_primitive(points[new], kind, surface)
         if again is None:
             return None
         surface, chosen = again, new

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig import _surfsig
 from surfsig.point_cloud import PointCloud
 from surfsig.surfaces.classes import PointClass, classify
 from surfsig.surfaces.colors import NO_SURFACE, surface_colors
@@ -20,9 +21,6 @@ from surfsig.surfaces.wording import HEADER, table_rows
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FEWEST = 20
-"""Fewer points are never a surface by themselves."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -199,7 +197,7 @@ class Surfaces:
             return "there are no points"
         if not finite:
             return f"of {len(self.cloud):,} points none is finite"
-        if finite < FEWEST:
+        if finite < _surfsig.FEWEST_SURFACE_POINTS:
             return f"{finite:,} points are too few"
         return f"of {finite:,} points too few lie on any one surface, within the noise around them"
 

@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig import _surfsig
 from surfsig.defaults import INTERVAL
 from surfsig.surfaces.area import covered_area
 from surfsig.surfaces.geometry import Array, Placement, covered_arc, in_plane
@@ -19,9 +20,6 @@ Kind = Literal["plane", "sphere", "cylinder", "cone", "torus"]
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 """All kinds, the simplest first."""
-
-PARAMETERS: dict[Kind, int] = {"plane": 3, "sphere": 4, "cylinder": 5, "cone": 6, "torus": 7}
-"""What each kind is determined by."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -156,7 +154,7 @@ def described(entry: Mapping[str, Any], points: Array, origin: Array) -> Surface
         length = float(np.ptp(heights))
     if kind in ("cylinder", "cone"):
         center = center + 0.5 * float(heights.min() + heights.max()) * placement.axis
-    unknowns = PARAMETERS[kind]
+    unknowns = _surfsig.KIND_PARAMETERS[kind]
     return Surface(
         kind=kind,
         point=entry["point"],

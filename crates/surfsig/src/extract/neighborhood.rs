@@ -58,7 +58,7 @@ pub(super) fn first_radius(cloud: &PointCloud<'_>, k: usize, monitor: &Monitor) 
     let most = distances.get(3 * distances.len() / 4).copied().unwrap_or(1.0);
     let found = distances.into_iter().find(|&d| d >= most && d > 0.0).unwrap_or(1.0);
     // Not below what float64 can number at these coordinates.
-    Radius::new((1.05 * found).clamp(1e-12 * largest.max(1e-6), 1e17))
+    Radius::new((1.05 * found).max(1e-12 * largest.max(1e-6)).min(1e17))
 }
 
 /// Distances to the k-th nearest point, the smallest first, at a few of the points; and the largest coordinate.

@@ -1,5 +1,6 @@
 //! The learned frame: what of a pool differs from place to place more than from scan to scan.
 
+use super::FieldSignature;
 use crate::simd::InstructionSet;
 use crate::simd::field::{ATOMS, AtomBlock, FEATURES, ORDERS, Pool, project};
 use std::sync::OnceLock;
@@ -58,39 +59,35 @@ impl FieldFrame {
         Self { orders: orders.collect(), offsets }
     }
 
-    /// The signature of a place, of length 1: coefficients of order 0, and magnitudes of the others, which do not
-    /// change when the patch is turned about its axis; and the phases, which do. `None` where nothing was pooled.
-    pub fn signature(
-        &self,
-        set: InstructionSet,
-        pool: &Pool,
-    ) -> Option<(Box<[f32; FIELD_SIGNATURE]>, Box<FieldPhases>)> {
-        let size = pool.features().iter().flatten().map(|&sum| f64::from(sum).powi(2)).sum::<f64>().sqrt();
-        let mut signature = Box::new([0.0; FIELD_SIGNATURE]);
-        let mut phases = Box::new([[[0.0; 2]; FIELD_PHASES]; ORDERS - 1]);
+    /// The signatures of some places, of length 1: coefficients of order 0, and magnitudes of the others, which do
+    /// not change when a patch is turned about its axis; and the phases, which do. `None` where nothing was pooled.
+    ///
+    /// Some at a time, so that atoms are fetched once for all.
+    pub fn signatures(&self, set: InstructionSet, pools: &[Pool]) -> Vec<Option<FieldSignature>> {
+        let mut found = vec![FieldSignature::of(0.0); pools.len()];
+        let size = |pool: &Pool| {
+            pool.features().iter().flatten().map(|&sum| f64::from(sum).powi(2)).sum::<f64>().sqrt()
+        };
+        let sizes: Vec<f64> = pools.iter().map(size).collect();
         let mut filled = 0;
         for (order, atoms) in self.orders.iter().enumerate() {
             for (first, block) in (0..).step_by(ATOMS).zip(&atoms.blocks) {
-                let [real, imaginary] = project(set, pool, order, block);
-                for l in 0..ATOMS.min(atoms.count - first) {
-                    let [re, im] = [real[l], imaginary[l]].map(|part| (f64::from(part) / size) as f32);
-                    let atom = first + l;
-                    signature[filled] =
-                        if order == 0 { re - self.offsets[atom] } else { im.mul_add(im, re * re).sqrt() };
-                    filled += 1;
-                    if order > 0 && atom < FIELD_PHASES {
-                        phases[order - 1][atom] = [re, im];
+                let count = ATOMS.min(atoms.count - first);
+                for ((pool, size), signature) in pools.iter().zip(&sizes).zip(&mut found) {
+                    let [real, imaginary] = project(set, pool, order, block);
+                    for l in 0..count {
+                        let [re, im] = [real[l], imaginary[l]].map(|part| (f64::from(part) / size) as f32);
+                        let atom = first + l;
+                        signature.vector[filled + l] =
+                            if order == 0 { re - self.offsets[atom] } else { im.mul_add(im, re * re).sqrt() };
+                        if order > 0 && atom < FIELD_PHASES {
+                            signature.phases[order - 1][atom] = [re, im];
+                        }
                     }
                 }
+                filled += count;
             }
         }
-        let length = signature.iter().map(|&value| f64::from(value).powi(2)).sum::<f64>().sqrt();
-        if !(length.is_finite() && length > 0.0) {
-            return None;
-        }
-        let unit = |value: &mut f32| *value = (f64::from(*value) / length) as f32;
-        signature.iter_mut().for_each(unit);
-        phases.iter_mut().flatten().flatten().for_each(unit);
-        Some((signature, phases))
+        found.into_iter().map(FieldSignature::of_unit_length).collect()
     }
 }

@@ -59,6 +59,23 @@ pub struct FieldSignature {
     pub phases: Box<FieldPhases>,
 }
 
+impl FieldSignature {
+    /// One of equal numbers.
+    fn of(number: f32) -> Self {
+        let phases = Box::new([[[number; 2]; FIELD_PHASES]; ORDERS - 1]);
+        Self { vector: Box::new([number; FIELD_SIGNATURE]), phases }
+    }
+
+    /// The same with a vector of length 1; `None` where it has no length.
+    fn of_unit_length(mut self) -> Option<Self> {
+        let length = self.vector.iter().map(|&value| f64::from(value).powi(2)).sum::<f64>().sqrt();
+        let unit = |value: &mut f32| *value = (f64::from(*value) / length) as f32;
+        self.vector.iter_mut().for_each(unit);
+        self.phases.iter_mut().flatten().flatten().for_each(unit);
+        (length.is_finite() && length > 0.0).then_some(self)
+    }
+}
+
 /// Field signatures of places, from the surface within a radius.
 ///
 /// # Errors
@@ -67,12 +84,12 @@ pub struct FieldSignature {
 /// ```
 /// use surfsig::{field_signatures, FieldOptions, Monitor, PointCloud, Queries, Radius, Status};
 /// // Two equal bumps on a floor, the second one turned.
-/// let height = |x: f64, y: f64| (-40.0 * (x * x + 3.0 * y * y + x * y)).exp() * 0.3;
+/// let height = |x: f64, y: f64| (-15.0 * (x * x + 3.0 * y * y + x * y)).exp() * 0.15;
 /// let points: Vec<[f64; 3]> = (0..160 * 80)
 ///     .map(|i| (f64::from(i % 160) * 0.025, f64::from(i / 160) * 0.025))
 ///     .map(|(x, y)| [x, y, height(x - 1.0, y - 1.0) + height(y - 1.0, 3.0 - x)])
 ///     .collect();
-/// let places = [[1.0, 1.0, 0.3], [3.0, 1.0, 0.3], [2.0, 1.0, 0.0]];
+/// let places = [[1.0, 1.0, 0.15], [3.0, 1.0, 0.15], [2.0, 1.0, 0.0]];
 /// let options = FieldOptions { viewpoint: Some([2.0, 1.0, 5.0]), ..Default::default() };
 /// let found = field_signatures(
 ///     &PointCloud::new_f64(&points), Radius::new(0.5)?, &Queries::Positions(PointCloud::new_f64(&places)),
@@ -93,15 +110,8 @@ pub fn field_signatures(
     monitor: &Monitor,
 ) -> Result<FieldPatches<FieldSignature>, Error> {
     let frame = FieldFrame::shared();
-    let none = || FieldSignature {
-        vector: Box::new([f32::NAN; FIELD_SIGNATURE]),
-        phases: Box::new([[[f32::NAN; 2]; FIELD_PHASES]; ORDERS - 1]),
-    };
-    let of_pool = |set, pool: &Pool| {
-        let (vector, phases) = frame.signature(set, pool)?;
-        Some(FieldSignature { vector, phases })
-    };
-    run(cloud, radius, queries, options, monitor, of_pool, none)
+    let of_pools = |set, pools: &[Pool]| frame.signatures(set, pools);
+    run(cloud, radius, queries, options, monitor, of_pools, || FieldSignature::of(f32::NAN))
 }
 
 /// What [`field_signatures`] sees in its frame: for each place, bin (ring by ring, in each by height) and pooled
@@ -129,8 +139,8 @@ pub fn field_pools(
     options: &FieldOptions<'_>,
     monitor: &Monitor,
 ) -> Result<FieldPatches<Box<[[f32; WAVES]; FEATURES]>>, Error> {
-    let of_pool = |_, pool: &Pool| Some(Box::new(*pool.features()));
-    run(cloud, radius, queries, options, monitor, of_pool, || Box::new([[f32::NAN; WAVES]; FEATURES]))
+    let of_pools = |_, pools: &[Pool]| pools.iter().map(|pool| Some(Box::new(*pool.features()))).collect();
+    run(cloud, radius, queries, options, monitor, of_pools, || Box::new([[f32::NAN; WAVES]; FEATURES]))
 }
 
 fn run<T: Send>(
@@ -139,7 +149,7 @@ fn run<T: Send>(
     queries: &Queries<'_>,
     options: &FieldOptions<'_>,
     monitor: &Monitor,
-    of_pool: impl Fn(InstructionSet, &Pool) -> Option<T> + Sync,
+    of_pools: impl Fn(InstructionSet, &[Pool]) -> Vec<Option<T>> + Sync,
     none: impl Fn() -> T + Sync,
 ) -> Result<FieldPatches<T>, Error> {
     queries.check(cloud)?;
@@ -150,6 +160,6 @@ fn run<T: Send>(
         let support = Support::new(cloud, radius, options, monitor)?;
         let places: Vec<[f64; 3]> = queries.positions(cloud).collect();
         let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
-        patches(&support, &places, radius, set, monitor, &of_pool, &none)
+        patches(&support, &places, radius, set, monitor, &of_pools, &none)
     })?
 }

@@ -17,6 +17,9 @@ const AXIS_SHARE: f32 = 0.5;
 /// Fewest members of a patch: as many as a paraboloid needs.
 const FEWEST: usize = 6;
 
+/// Patches that are made into values together.
+const TOGETHER: usize = 8;
+
 /// Rows of queries that a thread takes at a time.
 const ROWS: usize = 4;
 
@@ -26,7 +29,9 @@ struct Patch<'a> {
     curved: &'a [Curved],
     places: Vec<[f32; 3]>,
     members: Vec<Curved>,
-    pool: Box<Pool>,
+    /// Of the patches that wait to be made into values, and the numbers of their entries.
+    pools: Vec<Pool>,
+    waiting: Vec<usize>,
 }
 
 impl BallVisitor for Patch<'_> {
@@ -48,6 +53,20 @@ impl Patch<'_> {
         let along = |(_, member): (_, &Curved)| (0..3).map(|a| member.normal[a] * fitted[a]).sum::<f32>();
         if near.map(along).sum::<f32>() < 0.0 { fitted.map(|c| -c) } else { fitted }
     }
+
+    /// Makes the patches that wait into values.
+    fn settle<T>(
+        &mut self,
+        entries: &mut [Entry<T>],
+        set: InstructionSet,
+        of_pools: &impl Fn(InstructionSet, &[Pool]) -> Vec<Option<T>>,
+    ) {
+        let values = of_pools(set, &self.pools);
+        for (entry, value) in self.waiting.drain(..).zip(values) {
+            entries[entry].value = value;
+        }
+        self.pools.clear();
+    }
 }
 
 /// What one query gives.
@@ -58,14 +77,14 @@ struct Entry<T> {
     value: Option<T>,
 }
 
-/// The patches around places, each pool made into a value.
+/// The patches around places, the pools made into values.
 pub(super) fn patches<T: Send>(
     support: &Support,
     places: &[[f64; 3]],
     radius: Radius,
     set: InstructionSet,
     monitor: &Monitor,
-    of_pool: &(impl Fn(InstructionSet, &Pool) -> Option<T> + Sync),
+    of_pools: &(impl Fn(InstructionSet, &[Pool]) -> Vec<Option<T>> + Sync),
     none: &(impl Fn() -> T + Sync),
 ) -> Result<FieldPatches<T>, Error> {
     let surface = PointCloud::new_f64(&support.positions);
@@ -77,9 +96,9 @@ pub(super) fn patches<T: Send>(
     let finite = |i: usize| Some(places[i]).filter(|place| place.iter().all(|c| c.is_finite()));
     let asked = CellIndex::of_positions(places.len(), finite, radius, monitor)?;
     let worker = || {
-        let pool = Box::new(Pool::ZERO);
-        let patch =
-            Patch { index: &index, curved: &support.curved, places: Vec::new(), members: Vec::new(), pool };
+        let (pools, waiting) = (Vec::with_capacity(TOGETHER), Vec::with_capacity(TOGETHER));
+        let (places, members) = (Vec::new(), Vec::new());
+        let patch = Patch { index: &index, curved: &support.curved, places, members, pools, waiting };
         (DirectWalk::new(&index, set), patch)
     };
     let entries: Vec<Vec<Entry<T>>> = asked
@@ -93,10 +112,22 @@ pub(super) fn patches<T: Send>(
                 for rank in row.start..row.end {
                     let offset = [asked.x[rank], asked.y[rank], asked.z[rank]];
                     walk.enter_run(offset, offset);
-                    entries.push(entry(walk, patch, offset, asked.point_of_rank[rank], &fitted, of_pool));
+                    let query = asked.point_of_rank[rank];
+                    entries.push(entry(
+                        walk,
+                        patch,
+                        offset,
+                        query,
+                        fitted.normals[query as usize],
+                        entries.len(),
+                    ));
+                    if patch.pools.len() == TOGETHER {
+                        patch.settle(&mut entries, set, of_pools);
+                    }
                 }
                 monitor.add(row.end - row.start);
             }
+            patch.settle(&mut entries, set, of_pools);
             Ok(entries)
         })
         .collect::<Result<_, Error>>()?;
@@ -105,26 +136,28 @@ pub(super) fn patches<T: Send>(
     Ok(in_order(entries.into_iter().flatten(), &fitted, none))
 }
 
+/// The patch around a place; its pool waits to become the value of the entry with this number.
 fn entry<T>(
     walk: &mut DirectWalk<'_>,
     patch: &mut Patch<'_>,
     offset: [f32; 3],
     query: u32,
-    fitted: &Extraction,
-    of_pool: &impl Fn(InstructionSet, &Pool) -> Option<T>,
+    fitted: [f32; 3],
+    number: usize,
 ) -> Entry<T> {
     patch.places.clear();
     patch.members.clear();
     walk.visit(offset, patch);
     let count = patch.members.len();
-    let axis = patch.axis(fitted.normals[query as usize]);
-    let value = (axis[0].is_finite() && count >= FEWEST).then(|| {
-        *patch.pool = Pool::ZERO;
+    let axis = patch.axis(fitted);
+    if axis[0].is_finite() && count >= FEWEST {
         let x = tangent(axis);
-        pool(walk.set, &patch.places, &patch.members, &[x, cross(axis, x), axis], &mut patch.pool);
-        of_pool(walk.set, &patch.pool)
-    });
-    Entry { query, axis, count: count as u32, value: value.flatten() }
+        let mut sums = Pool::ZERO;
+        pool(walk.set, &patch.places, &patch.members, &[x, cross(axis, x), axis], &mut sums);
+        patch.pools.push(sums);
+        patch.waiting.push(number);
+    }
+    Entry { query, axis, count: count as u32, value: None }
 }
 
 /// A unit vector square to this one: from the coordinate axis that is farthest from it.

@@ -8,7 +8,7 @@ mod kind;
 pub(crate) mod paraboloid;
 pub(crate) mod quadric;
 #[cfg(test)]
-mod samples;
+pub(crate) mod samples;
 mod shape_error;
 mod sphere;
 mod taubin;

@@ -5,7 +5,7 @@ use nalgebra::{Rotation3, Vector3};
 pub(super) type Point = [f64; 3];
 
 /// Reproducible numbers: uniform ones in [0, 1), and normal ones.
-pub(super) struct Draws(pub u64);
+pub(crate) struct Draws(pub u64);
 
 impl Draws {
     fn uniform(&mut self) -> f64 {
@@ -17,11 +17,11 @@ impl Draws {
         ((x ^ (x >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.uniform()
     }
 
-    fn normal(&mut self) -> f64 {
+    pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()
     }

@@ -15,6 +15,7 @@ pub(crate) const ORDERS: usize = 8;
 pub(crate) const WAVES: usize = 2 * ORDERS;
 /// Numbers that each order has: one complex number per bin and quantity.
 pub(crate) const FEATURES: usize = RINGS * HEIGHTS * QUANTITIES;
+const _: () = assert!(FEATURES.is_multiple_of(2));
 
 /// What is known at a point of the surface.
 #[derive(Clone, Copy, Debug)]
@@ -192,15 +193,29 @@ for_each_instruction_set! {
 
 #[inline(always)]
 fn project_in(pool: &Pool, order: usize, atoms: &AtomBlock) -> [[f32; ATOMS]; 2] {
-    let (mut real, mut imaginary) = ([0.0_f32; ATOMS], [0.0_f32; ATOMS]);
     let features = pool.features();
-    for f in 0..FEATURES {
-        let (c, s) = (features[f][order], features[f][ORDERS + order]);
-        let [re, im] = &atoms[f];
-        for l in 0..ATOMS {
-            real[l] = s.mul_add(-im[l], c.mul_add(re[l], real[l]));
-            imaginary[l] = s.mul_add(re[l], c.mul_add(im[l], imaginary[l]));
+    // Eight sums that do not wait for each other: products of cosines and sines with both parts, of every other
+    // feature.
+    let mut sums = [[[0.0_f32; ATOMS]; 4]; 2];
+    for pair in 0..FEATURES / 2 {
+        for which in 0..2 {
+            let f = 2 * pair + which;
+            let (c, s) = (features[f][order], features[f][ORDERS + order]);
+            let [re, im] = &atoms[f];
+            let [c_re, s_im, c_im, s_re] = &mut sums[which];
+            for l in 0..ATOMS {
+                c_re[l] = c.mul_add(re[l], c_re[l]);
+                s_im[l] = s.mul_add(im[l], s_im[l]);
+                c_im[l] = c.mul_add(im[l], c_im[l]);
+                s_re[l] = s.mul_add(re[l], s_re[l]);
+            }
         }
+    }
+    let [even, odd] = sums;
+    let (mut real, mut imaginary) = ([0.0; ATOMS], [0.0; ATOMS]);
+    for l in 0..ATOMS {
+        real[l] = (even[0][l] + odd[0][l]) - (even[1][l] + odd[1][l]);
+        imaginary[l] = (even[2][l] + odd[2][l]) + (even[3][l] + odd[3][l]);
     }
     [real, imaginary]
 }

@@ -6,6 +6,7 @@ use crate::simd::InstructionSet;
 use crate::simd::select::Block;
 use crate::{Error, Monitor, Radius};
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 /// Points that are neighbours of each point.
 pub(super) const NEIGHBOURS: usize = 12;
@@ -121,6 +122,25 @@ impl Graph {
             }
         }
         Ok(())
+    }
+
+    /// The graph of all points, if this is that of some, one in each voxel: the others' only neighbour is that one.
+    pub fn with_left_out(self, positions: &[[f64; 3]], chosen: &[u32], edge: f64) -> Self {
+        let voxel = |i: usize| positions[i].map(|c| (c / edge).floor() as i64);
+        let in_voxel: FxHashMap<[i64; 3], u32> = chosen.iter().map(|&i| (voxel(i as usize), i)).collect();
+        let mut neighbours: Vec<_> = (0..positions.len())
+            .map(|i| {
+                let mut only = [NOBODY; NEIGHBOURS];
+                only[0] = in_voxel[&voxel(i)];
+                only
+            })
+            .collect();
+        for (own, &i) in self.neighbours.iter().zip(chosen) {
+            neighbours[i as usize] = own.map(|other| chosen.get(other as usize).copied().unwrap_or(NOBODY));
+        }
+        let mut nearest = vec![f32::INFINITY; positions.len()];
+        self.nearest.iter().zip(chosen).for_each(|(&own, &i)| nearest[i as usize] = own);
+        Self { neighbours, nearest }
     }
 
     /// The neighbours of a point.

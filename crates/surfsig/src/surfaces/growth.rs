@@ -1,9 +1,7 @@
 //! A surface that grows over its neighbours.
 
-use super::least_squares::{EXACT, Patience, QUICK, refine};
-use super::primitive::{Primitive, SurfaceKind, Vector};
 use super::scene::{Scene, Stamps};
-use super::start::{bent, start};
+use crate::primitive::{EXACT, Patience, Primitive, QUICK, SurfaceKind, Vector, bent, extent, refine, start};
 use nalgebra::Matrix3;
 
 /// Points that every surface has.
@@ -45,9 +43,6 @@ const THICKEST: f64 = 0.035;
 const LOOKED_AT: usize = 100;
 const LINE: f64 = 0.01;
 
-/// Noise of so many floors is none.
-const NOISELESS: f64 = 20.0;
-
 /// Rounds after the growth has ended.
 const MAX_SETTLING: usize = 6;
 
@@ -74,10 +69,6 @@ const ALONG: f64 = 0.9;
 const EVIDENCE: f64 = 10.0;
 
 impl Scene {
-    fn is_noiseless(&self, noise: f64) -> bool {
-        noise <= NOISELESS * self.floor
-    }
-
     fn patience(&self, noise: f64) -> Patience {
         if self.is_noiseless(noise) { EXACT } else { QUICK }
     }
@@ -101,13 +92,22 @@ pub(super) struct Grower<'a> {
     pub fewest: usize,
     /// Points around a seed from which a surface begins.
     pub first: usize,
+    /// Points at which a surface is large enough.
+    pub enough: usize,
     pub seen: &'a mut Stamps,
     pub inside: &'a mut Stamps,
 }
 
 impl Grower<'_> {
-    /// The surface that grows from a seed or the points that were tried.
+    /// The surface that grows from a seed, or the points that were tried.
     pub fn region_around(&mut self, seed: u32) -> Result<Region, Vec<u32>> {
+        let region = self.largest_around(seed)?;
+        let found = region.is_smooth(self.scene) && region.members.len() >= self.fewest;
+        if found { Ok(region) } else { Err(region.members) }
+    }
+
+    /// The surface that grows from a seed, smooth or not.
+    pub fn largest_around(&mut self, seed: u32) -> Result<Region, Vec<u32>> {
         let first = self.scene.around(seed, self.first, self.seen);
         let noise = self.scene.noise_around(seed, self.seen);
         let mut best: Option<Region> = None;
@@ -132,11 +132,7 @@ impl Grower<'_> {
             });
             best = better.or(best);
         }
-        match best {
-            Some(region) if region.is_smooth(self.scene) && region.members.len() >= self.fewest => Ok(region),
-            Some(region) => Err(region.members),
-            None => Err(first),
-        }
+        best.ok_or(first)
     }
 
     /// The simplest surface that explains a seed's first points as well as any.
@@ -160,6 +156,7 @@ impl Grower<'_> {
 
     /// A surface of a kind with more parameters near some points, if it explains them much better than a simpler one.
     fn more_complex(&self, kind: SurfaceKind, simpler: &Region, points: &[u32]) -> Option<Primitive> {
+        let all = points.len() as f64;
         let (points, normals) = self.scene.sample(points, SAMPLE_OF_KIND);
         let patience = self.scene.patience(simpler.noise);
         let (primitive, deviation) = fitted(kind, &points, &normals, &[simpler.primitive], patience)?;
@@ -167,7 +164,8 @@ impl Grower<'_> {
         let squares: f64 = points.iter().map(|point| chart.distance(point).powi(2)).sum();
         let before = (squares / points.len() as f64).sqrt();
         let more = kind.parameters() - simpler.primitive.kind.parameters();
-        let gain = points.len() as f64 * (before.max(1e-300) / deviation.max(1e-300)).ln();
+        let gain = (points.len() as f64).min(all / self.scene.likeness.alike)
+            * (before.max(1e-300) / deviation.max(1e-300)).ln();
         (gain > EVIDENCE * more as f64).then_some(primitive)
     }
 
@@ -192,7 +190,10 @@ impl Grower<'_> {
                 return None;
             }
             settled += usize::from(after < most);
-            if settled >= MAX_SETTLING || after < most && after.abs_diff(before) <= after / 300 {
+            if after >= self.enough
+                || settled >= MAX_SETTLING
+                || after < most && after.abs_diff(before) <= after / 300
+            {
                 break;
             }
         }
@@ -247,6 +248,14 @@ impl Region {
         Some(())
     }
 
+    /// The same points as a surface of another kind, if it is smooth.
+    pub fn of_kind(&self, kind: SurfaceKind, scene: &Scene) -> Option<Self> {
+        let (points, normals) = scene.sample(&self.members, SAMPLE);
+        let mut region = Self { primitive: start(kind, &points, &normals)?, ..self.clone() };
+        region.fit(scene, usize::MAX)?;
+        region.is_smooth(scene).then_some(region)
+    }
+
     /// Distance from the surface up to which points belong to it.
     pub fn tolerance(&self, scene: &Scene) -> f64 {
         NEAR * self.deviation.max(0.3 * self.noise).min(ROUGHEST * self.noise) + scene.floor
@@ -286,11 +295,4 @@ impl Region {
     pub fn is_smooth(&self, scene: &Scene) -> bool {
         self.deviation <= ROUGH * self.noise + scene.floor
     }
-}
-
-/// How far points are spread: the diagonal of their box.
-pub(super) fn extent(points: &[Vector]) -> f64 {
-    let far = Vector::repeat(f64::INFINITY);
-    let (low, high) = points.iter().fold((far, -far), |(low, high), p| (low.inf(p), high.sup(p)));
-    (high - low).norm()
 }

@@ -1,25 +1,21 @@
 //! Which parts of a scan are planes, spheres, cylinders, cones and tori.
 //!
-//! [`scene`] knows each point's neighbours, normal and noise; [`start`] reads a surface off points and normals,
-//! [`least_squares`] fits it by orthogonal distance, [`growth`] lets it grow, [`settling`] joins what is one and shares
-//! out what lies between.
+//! [`scene`] knows each point's neighbours, normal and noise; [`growth`] lets a [`crate::Primitive`] grow, [`settling`]
+//! joins what is one and shares out what lies between.
 
 mod graph;
 mod growth;
-mod least_squares;
-mod primitive;
+mod likeness;
 mod scene;
 mod settling;
-mod start;
-mod uncertainty;
 
-pub use primitive::SurfaceKind;
-
+use crate::primitive::{SurfaceKind, Vector, uncertainty};
 use crate::{Error, Monitor, PointCloud, with_threads};
 use growth::{Grower, Region};
-use primitive::Vector;
 use scene::{LOCAL, NONE, Scene, Stamps};
-use uncertainty::uncertainty;
+
+/// Fewer points are no surface, unless somebody says so.
+pub const FEWEST_SURFACE_POINTS: usize = 20;
 
 /// Seeds of which surfaces begin; of larger clouds not every point is one.
 const MOST_SEEDS: usize = 100_000;
@@ -27,6 +23,9 @@ const MOST_SEEDS: usize = 100_000;
 /// Nearest points by which noise and normals are judged: first few, then more where no surface was found, for the
 /// neighbours in a scan may err together.
 const LEVELS: [usize; 3] = [LOCAL, 4 * LOCAL, 16 * LOCAL];
+
+/// Standard errors by which a size must differ from what a simpler kind has in its place.
+const SIGNIFICANT: f64 = 2.0;
 
 /// How surfaces are found.
 ///
@@ -117,7 +116,8 @@ pub fn find_surfaces(
         let Some(mut scene) = Scene::new(cloud, options.noise, monitor)? else {
             return Ok(FoundSurfaces { labels: vec![NONE; cloud.len()], surfaces: Vec::new() });
         };
-        let fewest = options.fewest.unwrap_or_else(|| (scene.points.len() / 500).clamp(20, 1000));
+        let fewest =
+            options.fewest.unwrap_or_else(|| (scene.points.len() / 500).clamp(FEWEST_SURFACE_POINTS, 1000));
         // The simplest first, in whatever order they were asked for.
         let wanted = |kind: &SurfaceKind| options.kinds.is_empty() || options.kinds.contains(kind);
         let kinds: Vec<SurfaceKind> = SurfaceKind::ALL.into_iter().filter(wanted).collect();
@@ -126,7 +126,7 @@ pub fn find_surfaces(
         settling::assign(&mut scene, &mut regions);
         // Some may have lost their points to a nearer one.
         regions.retain(|region| region.members.len() >= fewest);
-        Ok(assembled(cloud.len(), &scene, regions))
+        Ok(assembled(cloud.len(), &scene, &kinds, regions))
     })?
 }
 
@@ -140,13 +140,23 @@ fn regions(
     let count = scene.points.len();
     let (mut seen, mut inside) = (Stamps::new(count), Stamps::new(count));
     let mut regions = Vec::new();
+    let mut unknown = scene.is_unknown();
     for level in LEVELS {
         if level > LOCAL {
             scene.look_farther(level, monitor)?;
         }
-        let left = (0..count as u32).filter(|&point| scene.labels[point as usize] == NONE);
-        let mut seeds: Vec<u32> = left.step_by(count.div_ceil(MOST_SEEDS)).collect();
+        let seed = |point: usize| scene.labels[point] == NONE && scene.noise[point].is_finite();
+        let left = scene.chosen.iter().copied().filter(|&point| seed(point as usize));
+        let mut seeds: Vec<u32> = left.step_by(scene.chosen.len().div_ceil(MOST_SEEDS)).collect();
         seeds.sort_by(|&a, &b| scene.noise[a as usize].total_cmp(&scene.noise[b as usize]));
+        if unknown {
+            unknown = !likeness::learn(scene, &seeds, |scene, seed, enough| {
+                let (seen, inside) = (&mut seen, &mut inside);
+                Grower { scene, kinds, fewest: enough / 40, first: level, enough, seen, inside }
+                    .largest_around(seed)
+                    .ok()
+            });
+        }
         // A point that took part in a failure is no seed any more.
         let mut tried = vec![false; count];
         for seed in seeds {
@@ -154,8 +164,15 @@ fn regions(
                 continue;
             }
             monitor.check()?;
-            let mut grower =
-                Grower { scene, kinds, fewest, first: level, seen: &mut seen, inside: &mut inside };
+            let mut grower = Grower {
+                scene,
+                kinds,
+                fewest,
+                first: level,
+                enough: usize::MAX,
+                seen: &mut seen,
+                inside: &mut inside,
+            };
             match grower.region_around(seed) {
                 Ok(region) => {
                     monitor.add(region.members.len());
@@ -172,7 +189,7 @@ fn regions(
 }
 
 /// What was found, the largest first.
-fn assembled(points: usize, scene: &Scene, mut regions: Vec<Region>) -> FoundSurfaces {
+fn assembled(points: usize, scene: &Scene, kinds: &[SurfaceKind], mut regions: Vec<Region>) -> FoundSurfaces {
     regions.sort_by_key(|region| std::cmp::Reverse(region.members.len()));
     let mut labels = vec![NONE; points];
     let surfaces = regions.iter_mut().enumerate().map(|(number, region)| {
@@ -181,10 +198,27 @@ fn assembled(points: usize, scene: &Scene, mut regions: Vec<Region>) -> FoundSur
         }
         // A fit that fails keeps the last one.
         let _ = region.fit(scene, usize::MAX);
-        described(region, scene)
+        let mut found = described(region, scene);
+        while let Some(simpler) = insignificant(&found).filter(|simpler| kinds.contains(simpler)) {
+            let Some(as_smooth) = region.of_kind(simpler, scene) else { break };
+            *region = as_smooth;
+            found = described(region, scene);
+        }
+        found
     });
     let surfaces = surfaces.collect();
     FoundSurfaces { labels, surfaces }
+}
+
+/// The simpler kind that a surface is not significantly different from: a sphere or cylinder whose radius is uncertain by
+/// half of itself may as well be a plane, and a cone that hardly opens a cylinder.
+fn insignificant(found: &FoundSurface) -> Option<SurfaceKind> {
+    let (size, error, simpler) = match found.kind {
+        SurfaceKind::Sphere | SurfaceKind::Cylinder => (found.radius, found.radius_std, SurfaceKind::Plane),
+        SurfaceKind::Cone => (found.half_angle, found.half_angle_std, SurfaceKind::Cylinder),
+        SurfaceKind::Plane | SurfaceKind::Torus => return None,
+    };
+    (size < SIGNIFICANT * error).then_some(simpler)
 }
 
 /// A region's surface with its errors.

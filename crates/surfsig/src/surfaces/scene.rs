@@ -1,10 +1,14 @@
 //! The points among which surfaces grow, and what is known about each.
 
 use super::graph::{Graph, NEIGHBOURS};
-use super::primitive::{Chart, Vector};
+use super::likeness::Likeness;
 use crate::extract::extract_within;
 use crate::fit::{FitKind, FitUsed};
-use crate::{Error, ExtractOptions, Extraction, Monitor, Neighborhood, PointCloud, Queries, Radius};
+use crate::primitive::{Chart, Vector};
+use crate::{
+    Error, ExtractOptions, Extraction, Monitor, Neighborhood, PointCloud, Queries, Radius,
+    voxel_representatives,
+};
 
 /// Nearest points to which a surface is fitted for a point's normal and noise.
 pub(super) const LOCAL: usize = 24;
@@ -27,8 +31,30 @@ const QUARTER: f64 = 1.15;
 /// Standard deviation of points that fill a ball instead of a surface in it, in units of its radius, and more.
 const THICK: f64 = 0.32;
 
+/// Noise in units of the usual one from which a place is on a step of the sensor's depth, ...
+const STEP: f64 = 0.1;
+
+/// ... and so many times as many points are looked at.
+const FARTHER: usize = 4;
+
+/// Points that look farther are not many more than this, ...
+const FARTHER_AT: usize = 20_000;
+
+/// ... but at least one in as many times as they look at so many points.
+const IN_COMMON: usize = 48;
+
+/// Noise of so many floors is none.
+const NOISELESS: f64 = 20.0;
+
 /// Label of a point that belongs to no surface.
 pub(super) const NONE: i32 = -1;
+
+/// Distance to the 24th neighbour in units of that to the nearest from which points are clumps, seen many times over:
+/// along the lines of a lidar it is 10, elsewhere 3 to 6. ...
+const CLUMPED: f64 = 15.0;
+
+/// ... Then voxels hold a point each, as wide as this part of that distance.
+const VOXELS: f64 = 4.0;
 
 /// Finite points about their middle, with what is known about each.
 pub(super) struct Scene {
@@ -43,9 +69,12 @@ pub(super) struct Scene {
     /// Standard deviations of the nearest points from those surfaces; infinite where there is none.
     pub noise: Vec<f64>,
     pub graph: Graph,
+    /// Points among which surfaces grow, ascending: all, or one of each clump.
+    pub chosen: Vec<u32>,
     /// Distances below this are rounding, whatever the noise seems to be.
     pub floor: f64,
     pub labels: Vec<i32>,
+    pub likeness: Likeness,
 }
 
 impl Scene {
@@ -54,28 +83,20 @@ impl Scene {
         let numbers: Vec<u32> =
             (0..cloud.len() as u32).filter(|&i| cloud.position(i as usize).is_some()).collect();
         let positions: Vec<[f64; 3]> = numbers.iter().filter_map(|&i| cloud.position(i as usize)).collect();
-        if positions.len() <= NEIGHBOURS {
-            return Ok(None);
+        let Some(mut around) = Surroundings::new(&positions, monitor)? else { return Ok(None) };
+        let mut chosen: Vec<u32> = (0..positions.len() as u32).collect();
+        if around.typical > CLUMPED * around.spacing {
+            let edge = around.typical / VOXELS;
+            chosen = voxel_representatives(&PointCloud::new_f64(&positions), Radius::new(edge)?)?;
+            let places: Vec<[f64; 3]> = chosen.iter().map(|&i| positions[i as usize]).collect();
+            let Some(thinned) = Surroundings::new(&places, monitor)? else { return Ok(None) };
+            around = thinned;
+            around.graph = around.graph.with_left_out(&positions, &chosen, edge);
         }
-        let finite = PointCloud::new_f64(&positions);
-        let queries = Queries::All;
-        let mut local = around(&finite, LOCAL, &queries, &monitor.apart())?;
-        // On a line of a lidar the nearest points tell nothing across it.
-        let on_lines: Vec<u32> =
-            (0..positions.len() as u32).filter(|&i| is_line(&local, i as usize)).collect();
-        let wider =
-            around(&finite, LOCAL * usize::from(ACROSS), &Queries::Indices(&on_lines), &monitor.apart())?;
-        local.take_over(on_lines.iter().map(|&i| i as usize).zip(0..), &wider);
-        let mut strides = vec![1_u8; positions.len()];
-        on_lines.iter().for_each(|&i| strides[i as usize] = ACROSS);
-        let typical = middle(local.radii.iter().map(|&r| f64::from(r)).filter(|r| *r > 0.0).collect());
-        let Some(typical) = typical else { return Ok(None) };
-        let graph = Graph::new(&positions, &strides, Radius::new(typical)?, monitor)?;
-        let spacing = middle(graph.nearest.iter().map(|&d| f64::from(d)).filter(|d| d.is_finite()).collect());
+        let Surroundings { local, graph, typical, spacing } = around;
         let count = positions.len() as f64;
         let origin = positions.iter().map(|p| Vector::from(*p)).sum::<Vector>() / count;
         let points: Vec<Vector> = positions.iter().map(|p| Vector::from(*p) - origin).collect();
-        let spacing = spacing.unwrap_or(0.0).max(1e-2 * typical);
         let mut scene = Self {
             known: noise,
             noise: vec![f64::INFINITY; points.len()],
@@ -85,26 +106,65 @@ impl Scene {
             numbers,
             origin,
             graph,
-            floor: FLOOR * spacing,
+            chosen,
+            floor: FLOOR * spacing.max(1e-2 * typical),
+            likeness: Likeness::NONE,
         };
-        scene.learn(&local, 0..scene.points.len());
+        let chosen = scene.chosen.clone();
+        scene.learn(&local, &chosen);
+        if noise.is_none() {
+            scene.look_across_steps(monitor)?;
+        }
         Ok(Some(scene))
     }
 
-    /// Looks at so many nearest points of each that has no label.
+    /// Looks at so many nearest points of those that have no label: of every so manieth, for neighbours have most of them
+    /// in common. The others' noise is not known any more.
     pub fn look_farther(&mut self, neighbours: usize, monitor: &Monitor) -> Result<(), Error> {
-        let positions: Vec<[f64; 3]> = self.points.iter().map(|p| (*p).into()).collect();
-        let left = (0..self.points.len() as u32).filter(|&i| self.labels[i as usize] == NONE);
-        let left: Vec<u32> = left.collect();
-        let cloud = PointCloud::new_f64(&positions);
-        let local = around(&cloud, neighbours, &Queries::Indices(&left), &monitor.apart())?;
-        self.learn(&local, left.iter().map(|&i| i as usize));
+        let left: Vec<u32> =
+            self.chosen.iter().copied().filter(|&point| self.labels[point as usize] == NONE).collect();
+        left.iter().for_each(|&point| self.noise[point as usize] = f64::INFINITY);
+        let step = left.len().div_ceil(FARTHER_AT).clamp(1, (neighbours / IN_COMMON).max(1));
+        let some: Vec<u32> = left.into_iter().step_by(step).collect();
+        self.look_around(&some, neighbours, monitor)
+    }
+
+    /// Looks at more points around those that lie on a surface much smoother than what is usual: they are on one step
+    /// of a sensor that measures in steps.
+    fn look_across_steps(&mut self, monitor: &Monitor) -> Result<(), Error> {
+        let known = self.noise.iter().copied().filter(|noise| noise.is_finite()).collect();
+        match middle(known) {
+            Some(usual) if !self.is_noiseless(usual) => {
+                let smooth = |&point: &u32| self.noise[point as usize] < STEP * usual;
+                let smooth: Vec<u32> = self.chosen.iter().copied().filter(smooth).collect();
+                self.look_around(&smooth, FARTHER * LOCAL, monitor)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Of some of the chosen points, ascending.
+    fn look_around(&mut self, some: &[u32], neighbours: usize, monitor: &Monitor) -> Result<(), Error> {
+        let places: Vec<[f64; 3]> = self.chosen.iter().map(|&i| self.points[i as usize].into()).collect();
+        let rank = |point: &u32| self.chosen.partition_point(|chosen| chosen < point) as u32;
+        let queries: Vec<u32> = some.iter().map(rank).collect();
+        let queries = Queries::Indices(&queries);
+        let local = around(&PointCloud::new_f64(&places), neighbours, &queries, &monitor.apart())?;
+        self.learn(&local, some);
         Ok(())
     }
 
+    pub fn is_unknown(&self) -> bool {
+        self.known.is_none()
+    }
+
+    pub fn is_noiseless(&self, noise: f64) -> bool {
+        noise <= NOISELESS * self.floor
+    }
+
     /// Takes over normals and noise of some points.
-    fn learn(&mut self, local: &Extraction, points: impl Iterator<Item = usize>) {
-        for (entry, point) in points.enumerate() {
+    fn learn(&mut self, local: &Extraction, points: &[u32]) {
+        for (entry, point) in points.iter().map(|&point| point as usize).enumerate() {
             let unknowns = if local.fit_used[entry] == FitUsed::Quadric { 9.0 } else { 6.0 };
             let freedom = f64::from(local.count[entry]) - unknowns;
             let noise = f64::from(local.residual[entry]) * (f64::from(local.count[entry]) / freedom).sqrt();
@@ -193,11 +253,12 @@ impl Scene {
         largest
     }
 
-    /// Points and normals of some points, evenly thinned to at most so many; those without a normal are left out.
+    /// Points and normals of some points, evenly thinned to at most so many; those are left out whose noise and normal are not
+    /// known.
     pub fn sample(&self, points: &[u32], most: usize) -> (Vec<Vector>, Vec<Vector>) {
         let step = points.len().div_ceil(most).max(1);
-        let with_normal = |point: &&u32| self.normals[**point as usize].x.is_finite();
-        let chosen = points.iter().step_by(step).filter(with_normal).map(|&point| point as usize);
+        let known = |point: &&u32| self.noise[**point as usize].is_finite();
+        let chosen = points.iter().step_by(step).filter(known).map(|&point| point as usize);
         chosen.map(|point| (self.points[point], self.normals[point])).unzip()
     }
 
@@ -218,7 +279,41 @@ impl Scene {
             return f64::INFINITY;
         }
         let quarter = noise.len() / 4;
-        QUARTER * *noise.select_nth_unstable_by(quarter, f64::total_cmp).1
+        self.likeness.spread * QUARTER * *noise.select_nth_unstable_by(quarter, f64::total_cmp).1
+    }
+}
+
+/// What is around each of some points.
+struct Surroundings {
+    local: Extraction,
+    graph: Graph,
+    /// Typical distance to the last of the nearest points.
+    typical: f64,
+    /// Typical distance to the nearest one.
+    spacing: f64,
+}
+
+impl Surroundings {
+    /// `None` where there are too few points, or all are one.
+    fn new(positions: &[[f64; 3]], monitor: &Monitor) -> Result<Option<Self>, Error> {
+        if positions.len() <= NEIGHBOURS {
+            return Ok(None);
+        }
+        let cloud = PointCloud::new_f64(positions);
+        let mut local = around(&cloud, LOCAL, &Queries::All, &monitor.apart())?;
+        // On a line of a lidar the nearest points tell nothing across it.
+        let on_lines: Vec<u32> =
+            (0..positions.len() as u32).filter(|&i| is_line(&local, i as usize)).collect();
+        let wider =
+            around(&cloud, LOCAL * usize::from(ACROSS), &Queries::Indices(&on_lines), &monitor.apart())?;
+        local.take_over(on_lines.iter().map(|&i| i as usize).zip(0..), &wider);
+        let mut strides = vec![1_u8; positions.len()];
+        on_lines.iter().for_each(|&i| strides[i as usize] = ACROSS);
+        let typical = middle(local.radii.iter().map(|&r| f64::from(r)).filter(|r| *r > 0.0).collect());
+        let Some(typical) = typical else { return Ok(None) };
+        let graph = Graph::new(positions, &strides, Radius::new(typical)?, monitor)?;
+        let spacing = middle(graph.nearest.iter().map(|&d| f64::from(d)).filter(|d| d.is_finite()).collect());
+        Ok(Some(Self { local, graph, typical, spacing: spacing.unwrap_or(0.0) }))
     }
 }
 

@@ -1,62 +1,23 @@
-//! The surfaces that are looked for, and how far points are from them.
+//! The surfaces, and how far points are from them.
 
+use super::SurfaceKind;
 use nalgebra::Vector3;
 
 /// A point or a direction.
-pub(super) type Vector = Vector3<f64>;
+pub(crate) type Vector = Vector3<f64>;
 
 /// Most parameters that a surface has.
 pub(super) const MOST_PARAMETERS: usize = 7;
 
-/// What a surface is.
-///
-/// ```
-/// assert_eq!(surfsig::SurfaceKind::Torus.name(), "torus");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[repr(u8)]
-pub enum SurfaceKind {
-    /// A plane.
-    Plane = 0,
-    /// A sphere.
-    Sphere = 1,
-    /// A circular cylinder.
-    Cylinder = 2,
-    /// A circular cone, one nappe of it.
-    Cone = 3,
-    /// A torus.
-    Torus = 4,
-}
-
-impl SurfaceKind {
-    /// All of them, the simplest first.
-    pub const ALL: [Self; 5] = [Self::Plane, Self::Sphere, Self::Cylinder, Self::Cone, Self::Torus];
-
-    /// The name, in lower case.
-    pub fn name(self) -> &'static str {
-        ["plane", "sphere", "cylinder", "cone", "torus"][self as usize]
-    }
-
-    /// Number of parameters.
-    pub fn parameters(self) -> usize {
-        [3, 4, 5, 6, 7][self as usize]
-    }
-}
-
-/// A surface without a boundary.
+/// A surface without a boundary, as [`crate::fit_primitive`] gives it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Primitive {
-    pub kind: SurfaceKind,
-    /// On the plane or the axis; the centre of a sphere or torus.
-    pub point: Vector,
-    /// Unit: a plane's normal, the axis of all others but the sphere.
-    pub axis: Vector,
-    /// Of a sphere or cylinder; of a cone at `point`; of a torus's tube.
-    pub radius: f64,
-    /// Of a torus: from the axis to the middle of the tube.
-    pub major_radius: f64,
-    /// Half the angle at a cone's apex; the radius grows along the axis.
-    pub half_angle: f64,
+pub struct Primitive {
+    pub(crate) kind: SurfaceKind,
+    pub(crate) point: Vector,
+    pub(crate) axis: Vector,
+    pub(crate) radius: f64,
+    pub(crate) major_radius: f64,
+    pub(crate) half_angle: f64,
 }
 
 /// A surface and two directions across its axis, in which its parameters are counted.
@@ -64,7 +25,7 @@ pub(super) struct Primitive {
 /// In this order: a plane's offset, and the tilts of its normal; a sphere's centre and radius; of all surfaces of
 /// revolution the shifts of the axis, its tilts, and then the radius (cylinder), the radius and the half angle
 /// (cone), the shift along the axis, the major radius and the tube's radius (torus).
-pub(super) struct Chart {
+pub(crate) struct Chart {
     pub primitive: Primitive,
     pub across: [Vector; 2],
     sine: f64,
@@ -72,26 +33,89 @@ pub(super) struct Chart {
 }
 
 impl Primitive {
-    pub fn chart(&self) -> Chart {
+    /// What it is.
+    pub fn kind(&self) -> SurfaceKind {
+        self.kind
+    }
+
+    /// On the plane or the axis, next to the mean of the points; the centre of a sphere or torus.
+    pub fn point(&self) -> [f64; 3] {
+        self.point.into()
+    }
+
+    /// Unit: a plane's normal, the axis of all others; with a positive z (else y, else x), but along a cone its radius
+    /// grows. Not a number for a sphere.
+    pub fn axis(&self) -> [f64; 3] {
+        if self.kind == SurfaceKind::Sphere { [f64::NAN; 3] } else { self.axis.into() }
+    }
+
+    /// Of a sphere or cylinder; of a cone at [`Self::point`]; of a torus's tube; not a number for a plane.
+    pub fn radius(&self) -> f64 {
+        if self.kind == SurfaceKind::Plane { f64::NAN } else { self.radius }
+    }
+
+    /// Of a torus, from the axis to the middle of the tube; not a number for others.
+    pub fn major_radius(&self) -> f64 {
+        if self.kind == SurfaceKind::Torus { self.major_radius } else { f64::NAN }
+    }
+
+    /// Half the angle at a cone's apex, in radians; not a number for others.
+    pub fn half_angle(&self) -> f64 {
+        if self.kind == SurfaceKind::Cone { self.half_angle } else { f64::NAN }
+    }
+
+    /// Signed distances of points: positive outside, or where a plane's normal points.
+    pub fn distances(&self, points: &[[f64; 3]]) -> Vec<f64> {
+        let chart = self.chart();
+        points.iter().map(|&point| chart.distance(&Vector::from(point))).collect()
+    }
+
+    /// The same surface, held next to a place.
+    pub(super) fn beside(&self, place: &Vector) -> Self {
+        let from = place - self.point;
+        let height = from.dot(&self.axis);
+        match self.kind {
+            SurfaceKind::Plane => Self { point: place - height * self.axis, ..*self },
+            SurfaceKind::Cylinder | SurfaceKind::Cone => Self {
+                point: self.point + height * self.axis,
+                radius: self.radius + height * self.half_angle.tan(),
+                ..*self
+            },
+            SurfaceKind::Sphere | SurfaceKind::Torus => *self,
+        }
+    }
+
+    /// The same surface; its axis has a positive z (else y, else x) where its sign means nothing.
+    pub(super) fn upward(&self) -> Self {
+        let up = self.kind == SurfaceKind::Cone || [self.axis.z, self.axis.y, self.axis.x] > [0.0; 3];
+        Self { axis: if up { self.axis } else { -self.axis }, ..*self }
+    }
+
+    /// The surface elsewhere.
+    pub(super) fn shifted(&self, by: &Vector) -> Self {
+        Self { point: self.point + by, ..*self }
+    }
+
+    pub(crate) fn chart(&self) -> Chart {
         let smallest = self.axis.iamin();
         let first = self.axis.cross(&Vector::ith(smallest, 1.0)).normalize();
         let (sine, cosine) = self.half_angle.sin_cos();
         Chart { primitive: *self, across: [first, self.axis.cross(&first)], sine, cosine }
     }
 
-    /// Whether it is of its kind at all, for points that extend so far.
-    pub fn is_valid(&self, extent: f64) -> bool {
+    /// Whether it is of its kind at all, for points that extend so far, and not `flat` times larger than these.
+    pub(super) fn is_valid(&self, extent: f64, flat: f64) -> bool {
         let finite = self.point.iter().chain(self.axis.iter()).all(|c| c.is_finite());
-        let radius = self.radius > 1e-6 * extent && self.radius < 100.0 * extent;
+        let radius = self.radius > 1e-6 * extent && self.radius < flat * extent;
         finite
             && match self.kind {
                 SurfaceKind::Plane => true,
                 SurfaceKind::Sphere | SurfaceKind::Cylinder => radius,
                 SurfaceKind::Cone => {
-                    self.radius.abs() < 100.0 * extent && (0.01..1.55).contains(&self.half_angle)
+                    self.radius.abs() < flat * extent && (0.01..1.55).contains(&self.half_angle)
                 }
                 SurfaceKind::Torus => {
-                    radius && self.major_radius > self.radius && self.major_radius < 100.0 * extent
+                    radius && self.major_radius > self.radius && self.major_radius < flat * extent
                 }
             }
     }
@@ -210,6 +234,13 @@ impl Chart {
         }
         p
     }
+}
+
+/// How far points are spread: the diagonal of their box.
+pub(crate) fn extent(points: &[Vector]) -> f64 {
+    let far = Vector::repeat(f64::INFINITY);
+    let (low, high) = points.iter().fold((far, -far), |(low, high), p| (low.inf(p), high.sup(p)));
+    (high - low).norm()
 }
 
 /// By a square root: these lengths are far from where a square overflows, and `hypot` takes ten times as long.

@@ -1,10 +1,64 @@
-//! Where a fit begins: surfaces read off points and their normals.
+//! Where a fit begins: surfaces read off points, or off points and their normals.
 
-use super::primitive::{Primitive, SurfaceKind, Vector};
+use super::{Primitive, SurfaceKind, Vector};
+use crate::extract::extract_within;
+use crate::fit::{FitKind, fit_cylinder, fit_sphere};
+use crate::{ExtractOptions, Moments, Monitor, Neighborhood, PointCloud, Queries};
 use nalgebra::{Matrix2, Matrix3, Matrix4, SymmetricEigen, Vector2, Vector4};
 
+/// Nearest points that tell a point's normal.
+const NEAREST: usize = 24;
+
+/// Surfaces of a kind that go roughly through points about 0 which extend so far.
+pub(super) fn starts(kind: SurfaceKind, points: &[Vector], extent: f64) -> Vec<Primitive> {
+    let positions: Vec<[f64; 3]> = points.iter().map(|&point| point.into()).collect();
+    let none = Primitive {
+        kind,
+        point: Vector::zeros(),
+        axis: Vector::z(),
+        radius: 0.0,
+        major_radius: 0.0,
+        half_angle: 0.0,
+    };
+    match kind {
+        SurfaceKind::Plane => start(kind, points, &[]).into_iter().collect(),
+        SurfaceKind::Sphere => fit_sphere(&Moments::of_points(&positions))
+            .map(|sphere| Primitive { point: sphere.centre.into(), radius: sphere.radius, ..none })
+            .into_iter()
+            .collect(),
+        SurfaceKind::Cylinder => fit_cylinder(&Moments::of_points(&positions))
+            .map(|pipe| Primitive {
+                point: pipe.centre.into(),
+                axis: pipe.axis.into(),
+                radius: pipe.radius,
+                ..none
+            })
+            .into_iter()
+            .collect(),
+        SurfaceKind::Cone | SurfaceKind::Torus => {
+            let (known, normals) = with_normals(&positions);
+            let pipes = starts(SurfaceKind::Cylinder, points, extent);
+            let bent = pipes.iter().flat_map(|pipe| bent(pipe, kind, extent));
+            start(kind, &known, &normals).into_iter().chain(bent).collect()
+        }
+    }
+}
+
+/// The points whose normals their nearest points tell, and these.
+fn with_normals(positions: &[[f64; 3]]) -> (Vec<Vector>, Vec<Vector>) {
+    let options = ExtractOptions { fit: FitKind::Quadric, ..Default::default() };
+    let cloud = PointCloud::new_f64(positions);
+    let nearest = Neighborhood::Nearest(NEAREST);
+    let Ok(found) = extract_within(&cloud, nearest, &Queries::All, &options, &Monitor::default()) else {
+        return Default::default();
+    };
+    let normals = found.normals.iter().map(|normal| Vector::from(normal.map(f64::from)));
+    let known = positions.iter().map(|&point| Vector::from(point)).zip(normals);
+    known.filter(|(_, normal)| normal.iter().all(|c| c.is_finite())).unzip()
+}
+
 /// A surface of a kind that goes roughly through the points; `None` where they determine none.
-pub(super) fn start(kind: SurfaceKind, points: &[Vector], normals: &[Vector]) -> Option<Primitive> {
+pub(crate) fn start(kind: SurfaceKind, points: &[Vector], normals: &[Vector]) -> Option<Primitive> {
     let count = points.len() as f64;
     let centre = points.iter().sum::<Vector>() / count;
     let none =
@@ -69,7 +123,7 @@ pub(super) fn start(kind: SurfaceKind, points: &[Vector], normals: &[Vector]) ->
 
 /// Surfaces of a kind that are nearly a simpler one, whose points extend so far: cones that hardly open, and tori
 /// that hardly bend or hardly have a hole.
-pub(super) fn bent(simpler: &Primitive, kind: SurfaceKind, extent: f64) -> Vec<Primitive> {
+pub(crate) fn bent(simpler: &Primitive, kind: SurfaceKind, extent: f64) -> Vec<Primitive> {
     match (simpler.kind, kind) {
         (SurfaceKind::Cylinder, SurfaceKind::Cone) => [simpler.axis, -simpler.axis]
             .map(|axis| Primitive { kind, axis, half_angle: 0.1, ..*simpler })

@@ -1,28 +1,33 @@
 //! Surfaces fitted by orthogonal distance: Levenberg and Marquardt's steps.
 
-use super::primitive::{MOST_PARAMETERS, Primitive, Vector};
+use super::geometry::{MOST_PARAMETERS, Primitive, Vector};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// How long a fit is followed.
 #[derive(Clone, Copy)]
-pub(super) struct Patience {
+pub(crate) struct Patience {
     /// Steps after which it is taken as it is.
     steps: usize,
     /// It has settled where a step gains less than this share of the sum of squares.
     settled: f64,
+    /// A radius so many times the points' extent is that of a plane.
+    flat: f64,
 }
 
 /// Among noise: what is left to gain is less than noise.
-pub(super) const QUICK: Patience = Patience { steps: 30, settled: 1e-4 };
+pub(crate) const QUICK: Patience = Patience { steps: 30, settled: 1e-4, flat: 100.0 };
 
 /// Without noise, along the narrow valleys of small patches: to the exact surface.
-pub(super) const EXACT: Patience = Patience { steps: 200, settled: 1e-7 };
+pub(crate) const EXACT: Patience = Patience { steps: 200, settled: 1e-7, flat: 100.0 };
+
+/// To the last digits, for points that somebody chose.
+pub(super) const EXHAUSTIVE: Patience = Patience { steps: 500, settled: 1e-13, flat: 1e6 };
 
 /// Distances that are nothing, in units of the points' extent.
 const NOTHING: f64 = 1e-12;
 
 /// A surface that was fitted to points.
-pub(super) struct Fitted {
+pub(crate) struct Fitted {
     pub primitive: Primitive,
     /// Root mean square of the distances.
     pub rms: f64,
@@ -30,9 +35,9 @@ pub(super) struct Fitted {
 
 /// The nearest surface of the same kind for which the sum of squared distances is least; `None` where there is none,
 /// or the points are fewer than its parameters.
-pub(super) fn refine(start: Primitive, points: &[Vector], extent: f64, patience: Patience) -> Option<Fitted> {
+pub(crate) fn refine(start: Primitive, points: &[Vector], extent: f64, patience: Patience) -> Option<Fitted> {
     let parameters = start.kind.parameters();
-    if points.len() <= parameters || !start.is_valid(extent) {
+    if points.len() <= parameters || !start.is_valid(extent, patience.flat) {
         return None;
     }
     let mut damping = 1e-4;
@@ -74,7 +79,7 @@ pub(super) fn refine(start: Primitive, points: &[Vector], extent: f64, patience:
             }
         }
     }
-    let valid = primitive.is_valid(extent) && sum.is_finite();
+    let valid = primitive.is_valid(extent, patience.flat) && sum.is_finite();
     valid.then(|| Fitted { primitive, rms: (sum / points.len() as f64).sqrt() })
 }
 
@@ -101,7 +106,7 @@ fn equations(primitive: &Primitive, points: &[Vector]) -> (DMatrix<f64>, DVector
 
 #[cfg(test)]
 mod tests {
-    use super::super::primitive::SurfaceKind;
+    use super::super::SurfaceKind;
     use super::*;
 
     #[test]

@@ -1,0 +1,405 @@
+//! What a sensor saw around a piece of a scan, as a depth image; and whether poses of another piece agree.
+
+/// Pixels along a side, however dense the scan.
+const MOST_PIXELS: f64 = 512.0;
+/// Squared pixels around a point of the scan that it speaks for; a pixel is a point spacing wide.
+const REACH: i32 = 2;
+/// Squared pixels from the next point of the scan up to which something may have been measured.
+const LOST: i32 = 6;
+/// Cosine between normals that face alike; those of narrow surfaces and of edges are smoothed.
+const ALIKE: f32 = 0.8;
+/// Tolerances from the surface within which another surface would have been told from it.
+const BESIDE: f32 = 4.0;
+/// Cosine to the line of sight from which on a surface is not too steep to be measured (65 degrees).
+const FACING: f32 = 0.42;
+
+/// A pose as a matrix that turns and shifts, row by row.
+pub type Pose = [[f64; 4]; 4];
+
+/// A place on a surface, with the unit normal on the sensor's side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePlace {
+    /// Where it is.
+    pub place: [f32; 3],
+    /// Its normal.
+    pub normal: [f32; 3],
+}
+
+/// What a scan says about surface places that a pose has moved into it: shares of all of them.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Judgement {
+    /// On the piece's own surface, facing alike.
+    pub confirmed: f32,
+    /// Where the sensor saw through, or beneath what the piece stands on.
+    pub contradicted: f32,
+    /// Visible, neither in front nor far behind, but not confirmed: at another angle, or just beneath.
+    pub astray: f32,
+    /// In sight and facing the sensor, but nothing was measured there.
+    pub missing: f32,
+}
+
+/// What is known of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Seen {
+    /// A point of the piece itself.
+    Own,
+    /// Another point.
+    Other,
+    /// No point, but one near by: it may be between two.
+    Between,
+    /// Nothing far around.
+    Nothing,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Pixel {
+    /// The nearest point of the scan, in the image's axes.
+    at: SurfacePlace,
+    /// The smallest depth in the 3 x 3 pixels around; below all where no point is in the pixel itself, as in
+    /// shadows and along rims too steep to be measured.
+    front: f32,
+    seen: Seen,
+}
+
+/// A depth image of a piece and its surroundings from where the sensor stood.
+///
+/// The origin is the piece's middle; the image plane is square to the line of sight to it.
+///
+/// ```
+/// use surfsig::{DepthImage, SurfacePlace};
+///
+/// // A square, one apart, seen from above; the same square, moved on to its side.
+/// let square: Vec<SurfacePlace> = (0..400)
+///     .map(|i| [(i % 20) as f32 - 9.5, (i / 20) as f32 - 9.5, 0.0])
+///     .map(|place| SurfacePlace { place, normal: [0.0, 0.0, 1.0] })
+///     .collect();
+/// let image = DepthImage::new(&square, &[true; 400], [0.0, 0.0, 1000.0], 1.0, 30.0, None);
+/// let moved = |x| [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+/// let [there, beside] = [0.0, 15.0].map(|x| image.judge(&moved(x), &square, 0.3));
+/// assert_eq!((there.confirmed, there.missing), (1.0, 0.0));
+/// assert!(beside.confirmed < 0.4 && beside.missing > 0.5);
+/// ```
+#[derive(Debug, Clone)]
+pub struct DepthImage {
+    axes: [[f32; 3]; 3],
+    /// From the eye to the origin.
+    distance: f32,
+    /// Pixels per unit of slope.
+    scale: f32,
+    side: usize,
+    pixels: Vec<Pixel>,
+    second: Option<Box<DepthImage>>,
+    /// In the image's axes.
+    floors: Vec<SurfacePlace>,
+}
+
+impl DepthImage {
+    /// Takes the image of a scan around the origin.
+    ///
+    /// `points` are those of the scan around a piece and `own` says which are the piece's; `spacing` is between
+    /// points; what is farther than `reach` from the line of sight is left out. `second` is another place that
+    /// points had to be seen from to be measured, as a triangulation scanner's camera is beside its laser.
+    ///
+    /// # Panics
+    /// If `own` has another length than `points`.
+    pub fn new(
+        points: &[SurfacePlace],
+        own: &[bool],
+        eye: [f64; 3],
+        spacing: f64,
+        reach: f64,
+        second: Option<[f64; 3]>,
+    ) -> Self {
+        assert_eq!(points.len(), own.len(), "one flag for each point");
+        let distance = eye.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let pixel = spacing.max(2.0 * reach / MOST_PIXELS);
+        let side = (2.0 * reach / pixel).ceil() as usize + 1;
+        let mut image = Self {
+            axes: axes_towards(eye.map(|x| -x / distance)),
+            distance: distance as f32,
+            scale: (distance / pixel) as f32,
+            side,
+            pixels: Vec::new(),
+            second: second.map(|other| Box::new(Self::new(points, own, other, spacing, reach, None))),
+            floors: Vec::new(),
+        };
+        image.fill(points, own);
+        image
+    }
+
+    /// Lets the piece stand on planes, each given by a place and its normal: nothing of it is beneath them.
+    #[must_use]
+    pub fn standing_on(mut self, floors: &[SurfacePlace]) -> Self {
+        self.floors = floors.iter().map(|floor| self.turned(floor)).collect();
+        self
+    }
+
+    fn fill(&mut self, points: &[SurfacePlace], own: &[bool]) {
+        let side = self.side;
+        let mut nearest = vec![None::<(f32, u32)>; side * side];
+        let turned: Vec<_> = points.iter().map(|point| self.turned(point)).collect();
+        for (number, point) in turned.iter().enumerate() {
+            if let Some((cell, depth)) = self.project(&point.place)
+                && nearest[cell].is_none_or(|(other, _)| depth < other)
+            {
+                nearest[cell] = Some((depth, number as u32));
+            }
+        }
+        let around = |cell: usize, squared: i32| {
+            let (row, column) = ((cell / side) as i32, (cell % side) as i32);
+            let inside = move |(y, x): (i32, i32)| y.min(x) >= 0 && y.max(x) < side as i32;
+            let steps = (-2..=2).flat_map(|dy| (-2..=2).map(move |dx| (dy, dx)));
+            steps
+                .filter(move |(dy, dx)| dy * dy + dx * dx <= squared)
+                .map(move |(dy, dx)| (dy * dy + dx * dx, (row + dy, column + dx)))
+                .filter(move |&(_, place)| inside(place))
+                .map(move |(apart, (y, x))| (apart, y as usize * side + x as usize))
+        };
+        let nothing = SurfacePlace { place: [0.0; 3], normal: [0.0; 3] };
+        let pixel = |cell: usize| {
+            let found = around(cell, LOST).filter_map(|(apart, other)| Some((apart, nearest[other]?)));
+            let Some((apart, (_, number))) = found.min_by_key(|(apart, _)| *apart) else {
+                return Pixel { at: nothing, front: f32::NEG_INFINITY, seen: Seen::Nothing };
+            };
+            let depths = around(cell, 2).filter_map(|(_, other)| nearest[other]).map(|(depth, _)| depth);
+            let seen = match (apart <= REACH, own[number as usize]) {
+                (false, _) => Seen::Between,
+                (true, true) => Seen::Own,
+                (true, false) => Seen::Other,
+            };
+            let front = if apart == 0 { depths.fold(f32::INFINITY, f32::min) } else { f32::NEG_INFINITY };
+            Pixel { at: turned[number as usize], front, seen }
+        };
+        self.pixels = (0..side * side).map(pixel).collect();
+    }
+
+    /// Tells what the scan says about surface places that a pose moves into it.
+    ///
+    /// `tolerance` is the height within which a place is on a surface.
+    pub fn judge(&self, pose: &Pose, places: &[SurfacePlace], tolerance: f32) -> Judgement {
+        let (turn, shift) = self.composed(pose);
+        let mut counts = [0_u32; 4];
+        for point in places {
+            let place = moved(&turn, &shift, &point.place);
+            if self.floors.iter().any(|floor| height_over(floor, &place) < -2.0 * tolerance) {
+                counts[1] += 1;
+                continue;
+            }
+            let Some((cell, depth)) = self.project(&place) else { continue };
+            let pixel = &self.pixels[cell];
+            match pixel.seen {
+                Seen::Between => {}
+                Seen::Nothing => {
+                    let normal = moved(&turn, &[0.0; 3], &point.normal);
+                    counts[3] += u32::from(self.should_be_seen(&place, &normal, tolerance));
+                }
+                seen => {
+                    let own = seen == Seen::Own;
+                    let height = height_over(&pixel.at, &place).abs();
+                    if own && height <= tolerance {
+                        let normal = moved(&turn, &[0.0; 3], &point.normal);
+                        if dot(&normal, &pixel.at.normal) > ALIKE {
+                            counts[0] += 1;
+                            // On the surface, however its rim lies before it.
+                            counts[1] += u32::from(depth < pixel.front - 2.0 * tolerance);
+                            continue;
+                        }
+                    }
+                    if depth < pixel.front - 2.0 * tolerance {
+                        counts[1] += 1;
+                    } else if own && height <= BESIDE * tolerance {
+                        counts[2] += 1;
+                    }
+                }
+            }
+        }
+        let share = |count: u32| count as f32 / places.len().max(1) as f32;
+        let [confirmed, contradicted, astray, missing] = counts.map(share);
+        Judgement { confirmed, contradicted, astray, missing }
+    }
+
+    /// The same for many poses.
+    pub fn judge_all(&self, poses: &[Pose], places: &[SurfacePlace], tolerance: f32) -> Vec<Judgement> {
+        poses.iter().map(|pose| self.judge(pose, places, tolerance)).collect()
+    }
+
+    /// For places that a pose moves to the piece's surface, or beside it: the points of the piece there, in the
+    /// scan's axes; `None` for others.
+    pub fn correspondences(
+        &self,
+        pose: &Pose,
+        places: &[SurfacePlace],
+        tolerance: f32,
+    ) -> Vec<Option<SurfacePlace>> {
+        let (turn, shift) = self.composed(pose);
+        let found = |point: &SurfacePlace| {
+            let place = moved(&turn, &shift, &point.place);
+            let pixel = &self.pixels[self.project(&place)?.0];
+            let normal = moved(&turn, &[0.0; 3], &point.normal);
+            let near = pixel.seen == Seen::Own
+                && height_over(&pixel.at, &place).abs() <= BESIDE * tolerance
+                && dot(&normal, &pixel.at.normal) > ALIKE;
+            near.then(|| SurfacePlace {
+                place: self.turned_back(&pixel.at.place),
+                normal: self.turned_back(&pixel.at.normal),
+            })
+        };
+        places.iter().map(found).collect()
+    }
+
+    /// Whether a place where nothing was measured faces both places it must be seen from, with nothing before it.
+    fn should_be_seen(&self, place: &[f32; 3], normal: &[f32; 3], tolerance: f32) -> bool {
+        self.faces(place, normal)
+            && self.second.as_ref().is_none_or(|second| {
+                let there = second.turned(&SurfacePlace {
+                    place: self.turned_back(place),
+                    normal: self.turned_back(normal),
+                });
+                second.faces(&there.place, &there.normal) && !second.hides(&there.place, tolerance)
+            })
+    }
+
+    fn faces(&self, place: &[f32; 3], normal: &[f32; 3]) -> bool {
+        let towards = [-place[0], -place[1], -self.distance - place[2]];
+        dot(normal, &towards) > FACING * dot(&towards, &towards).sqrt()
+    }
+
+    /// Whether something was measured before a place; not what a surface beside it would be if it went on there.
+    fn hides(&self, place: &[f32; 3], tolerance: f32) -> bool {
+        self.project(place).is_some_and(|(cell, depth)| {
+            let pixel = &self.pixels[cell];
+            let behind = depth - self.distance - pixel.at.place[2];
+            pixel.seen != Seen::Nothing && behind.min(-height_over(&pixel.at, place)) > 2.0 * tolerance
+        })
+    }
+
+    /// The pixel and the depth of a place in the image's axes.
+    fn project(&self, place: &[f32; 3]) -> Option<(usize, f32)> {
+        let depth = place[2] + self.distance;
+        let center = self.side as f32 / 2.0;
+        let [x, y] = [place[0], place[1]].map(|x| x / depth * self.scale + center);
+        let inside = |x: f32| x >= 0.0 && x < self.side as f32;
+        (depth > 0.0 && inside(x) && inside(y)).then(|| (x as usize * self.side + y as usize, depth))
+    }
+
+    fn turned(&self, point: &SurfacePlace) -> SurfacePlace {
+        let turn = |v: &[f32; 3]| self.axes.map(|axis| dot(&axis, v));
+        SurfacePlace { place: turn(&point.place), normal: turn(&point.normal) }
+    }
+
+    fn turned_back(&self, v: &[f32; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|i| (0..3).map(|k| self.axes[k][i] * v[k]).sum())
+    }
+
+    /// The pose, and then into the image's axes.
+    fn composed(&self, pose: &Pose) -> ([[f32; 3]; 3], [f32; 3]) {
+        let entry = |axis: &[f32; 3], column: usize| {
+            (0..3).map(|k| f64::from(axis[k]) * pose[k][column]).sum::<f64>() as f32
+        };
+        (
+            self.axes.map(|axis| [0, 1, 2].map(|column| entry(&axis, column))),
+            self.axes.map(|axis| entry(&axis, 3)),
+        )
+    }
+}
+
+/// Three axes square to each other, the last one along a unit vector.
+fn axes_towards(forward: [f64; 3]) -> [[f32; 3]; 3] {
+    let forward = nalgebra::Vector3::from(forward);
+    let mut across = nalgebra::Vector3::zeros();
+    across[forward.iamin()] = 1.0;
+    let side = forward.cross(&across).normalize();
+    [side, forward.cross(&side), forward].map(|axis| axis.map(|x| x as f32).into())
+}
+
+fn dot(a: &[f32; 3], b: &[f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn moved(turn: &[[f32; 3]; 3], shift: &[f32; 3], v: &[f32; 3]) -> [f32; 3] {
+    [0, 1, 2].map(|i| dot(&turn[i], v) + shift[i])
+}
+
+/// The height of a place over the tangent plane of another.
+fn height_over(at: &SurfacePlace, place: &[f32; 3]) -> f32 {
+    dot(&at.normal, &[0, 1, 2].map(|i| place[i] - at.place[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UP: [f32; 3] = [0.0, 0.0, 1.0];
+    const FAR_ABOVE: [f64; 3] = [0.0, 0.0, 1e4];
+
+    fn at(x: f32, y: f32, z: f32) -> SurfacePlace {
+        SurfacePlace { place: [x, y, z], normal: UP }
+    }
+
+    fn board(columns: std::ops::Range<i32>, rows: std::ops::Range<i32>, z: f32) -> Vec<SurfacePlace> {
+        let row = |y: i32| columns.clone().map(move |x| at(x as f32, y as f32, z));
+        rows.flat_map(row).collect()
+    }
+
+    fn unmoved() -> Pose {
+        std::array::from_fn(|i| std::array::from_fn(|j| f64::from(i == j)))
+    }
+
+    /// A square of 21 before a wall, with a strip from x = 16 to 22 where nothing was measured.
+    fn image(second: Option<[f64; 3]>) -> DepthImage {
+        let square = board(-10..11, -10..11, 0.0);
+        let mut points = board(-30..31, -30..31, -10.0);
+        points.retain(|point| point.place[0] < 16.0 || point.place[0] > 22.0);
+        let own: Vec<bool> = (0..square.len() + points.len()).map(|number| number < square.len()).collect();
+        DepthImage::new(&[square, points].concat(), &own, FAR_ABOVE, 1.0, 30.0, second)
+    }
+
+    fn judged(image: &DepthImage, point: SurfacePlace) -> [f32; 4] {
+        let found = image.judge(&unmoved(), &[point], 0.3);
+        [found.confirmed, found.contradicted, found.astray, found.missing]
+    }
+
+    #[test]
+    fn what_is_on_hidden_through_and_missing() {
+        let image = image(None);
+        assert_eq!(judged(&image, at(5.0, 5.0, 0.1)), [1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(judged(&image, at(5.0, 5.0, -1.0)), [0.0, 0.0, 1.0, 0.0]);
+        assert_eq!(judged(&image, at(5.0, 5.0, -8.0)), [0.0; 4]);
+        assert_eq!(judged(&image, at(-20.0, 5.0, -2.0)), [0.0, 1.0, 0.0, 0.0]);
+        assert_eq!(judged(&image, at(19.0, 0.0, 0.0)), [0.0, 0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn what_turns_its_back_is_neither_confirmed_nor_missing() {
+        let away = |x| SurfacePlace { place: [x, 5.0, 0.0], normal: [0.0, 0.0, -1.0] };
+        assert_eq!(judged(&image(None), away(5.0)), [0.0, 0.0, 1.0, 0.0]);
+        assert_eq!(judged(&image(None), away(19.0)), [0.0; 4]);
+    }
+
+    #[test]
+    fn nothing_is_missing_where_a_second_place_could_not_see() {
+        // Seen from the left at 45 degrees, the square hides what is 9 behind its plane and 19 to the right.
+        let beside = image(Some([-1e4, 0.0, 1e4]));
+        assert_eq!(judged(&beside, at(19.0, 0.0, -15.0))[3], 0.0);
+        assert_eq!(judged(&beside, at(19.0, 0.0, 0.0))[3], 1.0);
+    }
+
+    #[test]
+    fn nothing_is_beneath_the_floor() {
+        let standing = image(None).standing_on(&[at(0.0, 0.0, -5.0)]);
+        assert_eq!(judged(&standing, at(5.0, 5.0, -8.0)), [0.0, 1.0, 0.0, 0.0]);
+        assert_eq!(judged(&standing, at(5.0, 5.0, -4.0)), [0.0; 4]);
+    }
+
+    #[test]
+    fn correspondences_are_the_points_there_in_the_axes_of_the_scan() {
+        let image = image(None);
+        let mut pose = unmoved();
+        pose[0][3] = 3.0;
+        let found = image.correspondences(&pose, &[at(0.2, 4.1, 0.1), at(12.0, 4.0, 0.1)], 0.3);
+        let near = found[0].expect("on the square");
+        let apart = |a: [f32; 3], b: [f32; 3]| (0..3).map(|i| (a[i] - b[i]).abs()).fold(0.0, f32::max);
+        assert!(apart(near.place, [3.0, 4.0, 0.0]) <= 1.0 && apart(near.normal, UP) < 1e-6);
+        assert_eq!(found[1], None);
+    }
+}

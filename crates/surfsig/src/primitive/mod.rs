@@ -1,0 +1,122 @@
+//! One surface of a kind: its distance, its fit, and how sure that is.
+//!
+//! [`geometry`] measures distances and their derivatives, [`start`] reads a surface off points, [`least_squares`] makes
+//! the sum of squared distances least, [`uncertainty`] says from [`blocks`] of neighbours how sure the parameters are.
+
+mod blocks;
+mod geometry;
+mod kind;
+mod least_squares;
+mod start;
+mod uncertainty;
+
+pub(crate) use blocks::design_effect;
+pub use geometry::Primitive;
+pub(crate) use geometry::{Chart, Vector, extent};
+pub use kind::SurfaceKind;
+pub(crate) use least_squares::{EXACT, Patience, QUICK, refine};
+pub(crate) use start::{bent, start};
+pub use uncertainty::PrimitiveUncertainty;
+pub(crate) use uncertainty::uncertainty;
+
+use least_squares::EXHAUSTIVE;
+use uncertainty::Linear;
+
+/// Fits a surface to points: the sum of squared orthogonal distances is least.
+///
+/// The fit begins from `start`, which must be of the same kind and near the points, or from what the points tell: of
+/// planes, spheres and cylinders their moments, of cones and tori the normals of the nearest 24 points around each.
+///
+/// `None` where the points are no more than the parameters, do not determine all of them (those of a circle no sphere),
+/// or are not finite.
+///
+/// ```
+/// use surfsig::{fit_primitive, SurfaceKind};
+/// // A third of a pipe along x.
+/// let points: Vec<[f64; 3]> = (0..100)
+///     .map(|i| (0.01 * f64::from(i), 2.0 * (2.4 * f64::from(i)).fract()))
+///     .map(|(x, t)| [x, 0.25 * t.cos(), 0.7 + 0.25 * t.sin()])
+///     .collect();
+/// let pipe = fit_primitive(&points, SurfaceKind::Cylinder, None).unwrap();
+/// assert!((pipe.radius() - 0.25).abs() < 1e-9 && (pipe.point()[2] - 0.7).abs() < 1e-9);
+/// assert!(pipe.distances(&points).iter().all(|distance| distance.abs() < 1e-9));
+/// assert!(fit_primitive(&points[..5], SurfaceKind::Cylinder, None).is_none());
+/// ```
+pub fn fit_primitive(points: &[[f64; 3]], kind: SurfaceKind, start: Option<&Primitive>) -> Option<Primitive> {
+    if points.len() <= kind.parameters() {
+        return None;
+    }
+    // About their mean: squares of coordinates far from 0 lose digits.
+    let mean = points.iter().map(|&p| Vector::from(p)).sum::<Vector>() / points.len() as f64;
+    let local: Vec<Vector> = points.iter().map(|&p| Vector::from(p) - mean).collect();
+    let extent = extent(&local);
+    if !(extent > 0.0 && extent.is_finite()) {
+        return None;
+    }
+    let starts = match start {
+        Some(start) if start.kind == kind => vec![start.shifted(&-mean)],
+        Some(_) => return None,
+        None => start::starts(kind, &local, extent),
+    };
+    let fits =
+        starts.iter().filter_map(|start| refine(start.beside(&Vector::zeros()), &local, extent, EXHAUSTIVE));
+    let best = fits.min_by(|a, b| a.rms.total_cmp(&b.rms))?;
+    let primitive = best.primitive.beside(&Vector::zeros()).upward();
+    Linear::of(&primitive, &local)?;
+    Some(primitive.shifted(&mean))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points of a surface that turns about (0.6, 0, 0.8), by their distance from that axis and their height.
+    fn revolved(count: u32, profile: impl Fn(f64) -> (f64, f64)) -> Vec<[f64; 3]> {
+        let [axis, first, second] = [[0.6, 0.0, 0.8], [0.8, 0.0, -0.6], [0.0, 1.0, 0.0]].map(Vector::from);
+        let place = |i: u32| {
+            let (away, height) = profile((0.414_214 * f64::from(i)).fract());
+            let (sine, cosine) = (2.399_963 * f64::from(i)).sin_cos();
+            Vector::new(5.0, 6.0, 7.0) + height * axis + away * (cosine * first + sine * second)
+        };
+        (0..count).map(|i| place(i).into()).collect()
+    }
+
+    #[test]
+    fn cones_and_tori_are_found_without_a_start() {
+        let points = revolved(2000, |share| (0.5 + 0.4 * share, share));
+        let cone = fit_primitive(&points, SurfaceKind::Cone, None).unwrap();
+        assert!((cone.half_angle() - 0.4_f64.atan()).abs() < 1e-9, "{cone:?}");
+        assert!(Vector::from(cone.axis()).dot(&Vector::new(0.6, 0.0, 0.8)) > 1.0 - 1e-12);
+        let tube = |share: f64| (std::f64::consts::TAU * share).sin_cos();
+        let points = revolved(2000, |share| (1.0 + 0.3 * tube(share).1, 0.3 * tube(share).0));
+        let torus = fit_primitive(&points, SurfaceKind::Torus, None).unwrap();
+        assert!((torus.radius() - 0.3).abs() < 1e-9 && (torus.major_radius() - 1.0).abs() < 1e-9);
+        assert!((Vector::from(torus.point()) - Vector::new(5.0, 6.0, 7.0)).norm() < 1e-8);
+    }
+
+    #[test]
+    fn a_fit_goes_on_from_a_start() {
+        let points = revolved(300, |share| (0.5, share));
+        let near = fit_primitive(&points[..40], SurfaceKind::Cylinder, None).unwrap();
+        let fitted = fit_primitive(&points, SurfaceKind::Cylinder, Some(&near)).unwrap();
+        assert!((fitted.radius() - 0.5).abs() < 1e-10);
+        // Its point is beside the middle of the points.
+        let middle = points.iter().map(|&p| Vector::from(p)).sum::<Vector>() / 300.0;
+        let from = middle - Vector::from(fitted.point());
+        assert!(from.dot(&Vector::from(fitted.axis())).abs() < 1e-12);
+        assert!(fit_primitive(&points, SurfaceKind::Sphere, Some(&near)).is_none());
+    }
+
+    #[test]
+    fn what_determines_no_surface_is_none() {
+        let circle: Vec<[f64; 3]> =
+            (0..9).map(|i| f64::from(i).sin_cos()).map(|(x, y)| [x, y, 0.0]).collect();
+        let line: Vec<[f64; 3]> = (0..9).map(f64::from).map(|i| [i, 2.0 * i, 3.0 * i]).collect();
+        assert!(fit_primitive(&circle, SurfaceKind::Sphere, None).is_none());
+        for kind in SurfaceKind::ALL {
+            for points in [&line[..], &[[1.0, 2.0, 3.0]; 9], &[[f64::NAN; 3]; 9], &[[1e200; 3]; 9], &[]] {
+                assert!(fit_primitive(points, kind, None).is_none(), "{kind:?} {points:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! How alike neighbouring points err, learnt from surfaces that grow on trial.
+//!
+//! The nearest points of a place show only what errors differ by among themselves. What they have in common (steps of
+//! a sensor's depth, a lens, smoothing in the camera) bends a surface instead, and would make two of one.
+
+use super::growth::Region;
+use super::scene::{Scene, middle};
+use crate::primitive::{Vector, design_effect};
+
+/// Surfaces that are grown on trial, from seeds spread evenly over those whose noise is from a tenth to six tenths.
+const TRIALS: usize = 48;
+const SMOOTHEST: f64 = 0.1;
+const ROUGHEST: f64 = 0.6;
+
+/// Fewest of them that tell something.
+const FEWEST: usize = 8;
+
+/// Points at which a trial ends, and which it must have.
+const ENOUGH: usize = 2000;
+const LEAST: usize = 60;
+
+/// Points in a block of neighbours.
+const BLOCK: usize = 50;
+
+/// Fewest points that err as one from which they count as alike at all.
+const ALIKE: f64 = 2.0;
+
+/// Rounds, and the ratio at which they end.
+const ROUNDS: usize = 5;
+const SETTLED: f64 = 1.08;
+
+/// What surfaces' points stray by, in units of what the nearest points show, and how many points err as one.
+#[derive(Clone, Copy)]
+pub(super) struct Likeness {
+    pub spread: f64,
+    pub alike: f64,
+}
+
+impl Likeness {
+    /// Points that err each for itself.
+    pub const NONE: Self = Self { spread: 1.0, alike: 1.0 };
+}
+
+/// Looks how far surfaces stray that may stray as far as the last ones did, until that does not grow any more. Says
+/// whether there was anything to learn from.
+pub(super) fn learn(
+    scene: &mut Scene,
+    seeds: &[u32],
+    mut grower: impl FnMut(&Scene, u32, usize) -> Option<Region>,
+) -> bool {
+    let (first, last) = ((SMOOTHEST * seeds.len() as f64) as usize, (ROUGHEST * seeds.len() as f64) as usize);
+    let step = ((last - first) / TRIALS).max(1);
+    for round in 0..ROUNDS {
+        let mut strays = Vec::new();
+        let mut alike = Vec::new();
+        for &seed in seeds[first..last].iter().step_by(step) {
+            let Some(region) = grower(scene, seed, ENOUGH) else { continue };
+            if region.members.len() >= LEAST && !scene.is_noiseless(region.noise) {
+                strays.push(region.deviation / region.noise);
+                alike.push(points_as_one(scene, &region));
+            }
+        }
+        if strays.len() < FEWEST {
+            return round > 0;
+        }
+        let (stray, alike) = (middle(strays).unwrap_or(1.0), middle(alike).unwrap_or(1.0));
+        if alike < ALIKE {
+            return true;
+        }
+        scene.likeness.alike = alike;
+        if stray < SETTLED {
+            return true;
+        }
+        scene.likeness.spread *= stray;
+    }
+    true
+}
+
+/// How many points of a surface count as one.
+fn points_as_one(scene: &Scene, region: &Region) -> f64 {
+    let points: Vec<Vector> = region.members.iter().map(|&member| scene.points[member as usize]).collect();
+    let chart = region.primitive.chart();
+    let residuals: Vec<f64> = points.iter().map(|point| chart.distance(point)).collect();
+    design_effect(&points, &residuals, points.len().div_ceil(BLOCK))
+}

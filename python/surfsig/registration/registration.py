@@ -1,0 +1,88 @@
+"""What `register` gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfsig.point_cloud import PointCloud, coordinate_array
+from surfsig.recurrences.free_directions import FreeDirection
+from surfsig.registration.motion import moved
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Registration:
+    """How a source lies in a target, and how sure that is.
+
+    Where nothing was found, the pose and its covariance are NaN.
+    """
+
+    T_target_source: Array
+    """(4, 4): a point p of the source is at R p + t of the target."""
+    covariance: Array
+    """(6, 6), of the small motion (rotation vector in radians, then translation) in the target's axes, about
+    `center`, that brings the given pose onto the true one: T_true = shift(center) exp(motion) shift(-center)
+    T_target_source. Large in the free directions."""
+    center: Array
+    """Middle of what overlaps, (3,), in the target's coordinates."""
+    free_directions: list[FreeDirection]
+    """Motions of the source, in the target's coordinates, in which the geometry does not hold it."""
+    matches: int
+    """Pairs of places that look alike; 0 where a start was given."""
+    inliers: int
+    """Those of them that agree with the pose."""
+    overlap: float
+    """Share of the source's surface that lies on the target's, 0 to 1."""
+    rms: float
+    """Root mean square of the distances there, in the clouds' own unit."""
+    radius: float
+    """Of the patches that were matched; with a start, of the same size."""
+    trusted: bool
+    """Whether the pose is right, by what was seen: of 100 wrong ones at most 5 are trusted, of 100 right ones
+    at least 95. False where a direction is free, as any pose along it is as good."""
+
+    def __repr__(self) -> str:
+        """Say what was found."""
+        word = "trusted" if self.trusted else "not trusted"
+        free = "".join(f", {direction}" for direction in self.free_directions)
+        return (
+            f"Registration({word}: {self.inliers} of {self.matches} matches agree, "
+            f"overlap {self.overlap:.2f}, rms {self.rms:.3g}{free})"
+        )
+
+    def apply(self, points: ArrayLike) -> Array:
+        """Move points of the source, (n, 3), into the target.
+
+        Raises
+        ------
+        InvalidInputError
+            If they are no points.
+        """
+        places = coordinate_array(np.asarray(points), "points").astype(np.float64)
+        rotation, shift = self.T_target_source[:3, :3], self.T_target_source[:3, 3]
+        return np.asarray(places @ rotation.T + shift)
+
+    def moved(self, cloud: PointCloud) -> PointCloud:
+        """Move a cloud of the source into the target, its viewpoint and normals with it."""
+        return moved(cloud, self.T_target_source)
+
+    def values(self) -> dict[str, Any]:
+        """Give everything as plain numbers, for JSON; None for what is not known."""
+        known = bool(np.isfinite(self.T_target_source).all())
+        return {
+            "T_target_source": self.T_target_source.tolist() if known else None,
+            "covariance": self.covariance.tolist() if np.isfinite(self.covariance).all() else None,
+            "center": self.center.tolist() if known else None,
+            "free_directions": [free.values() for free in self.free_directions],
+            "matches": self.matches,
+            "inliers": self.inliers,
+            "overlap": self.overlap,
+            "rms": self.rms if np.isfinite(self.rms) else None,
+            "radius": self.radius,
+            "trusted": self.trusted,
+        }
