@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from surfsig.clean import downsample
 from surfsig.odometry.local_map import LocalMap, prepared
-from surfsig.odometry.motion import moved, orthonormal, small
+from surfsig.odometry.motion import inverse, moved, orthonormal, small
+from surfsig.odometry.panorama import Panorama
 from surfsig.point_cloud import PointCloud
 
 Array = NDArray[np.float64]
@@ -47,6 +48,8 @@ class Alignment:
     """(6, 6), of the small motion in the scan's axes that is missing."""
     overlap: float
     """Share of the scan's places that lie on the map's surface."""
+    seen_through: float
+    """Share of the map's places that the sensor looked through, of those that it should have seen."""
     held: bool
     """Whether the surfaces hold the scan in all directions."""
     scans: NDArray[np.int64]
@@ -61,6 +64,7 @@ class Scan:
         self.points = downsample(PointCloud(points), 1.0).points
         """Its places: the mean of each voxel's points, (m, 3)."""
         self.cloud, _ = prepared(self.points, threads)
+        self.panorama = Panorama(self.points)
 
     def __len__(self) -> int:
         """Return the number of places."""
@@ -124,6 +128,7 @@ def align(scan: Scan, around: LocalMap, start: Array, reach: float) -> Alignment
         pose,
         _covariance(design, heights[on], scan.points[on]),
         float(on.mean()),
+        scan.panorama.seen_through(moved(inverse(pose), around.points)),
         _is_held(design),
         around.scans[nearest[on]],
     )

@@ -71,7 +71,9 @@ class Keyframes:
         result.keep_within(center, distance)
         return result
 
-    def find(self, scan: Scan, distance: float) -> tuple[Alignment, LocalMap] | None:
+    def find(
+        self, scan: Scan, distance: float, most_seen_through: float
+    ) -> tuple[Alignment, LocalMap] | None:
         """Find where a scan was taken, by its signatures; None where nothing fits.
 
         Parameters
@@ -80,6 +82,8 @@ class Keyframes:
             The scan.
         distance
             From the sensor to the farthest places of a map.
+        most_seen_through
+            Share of the map's places that the scan may have looked through.
 
         Returns
         -------
@@ -100,7 +104,9 @@ class Keyframes:
         for _, pose in proposals[:_TRIED]:
             around = self.submap(pose[:3, 3], distance)
             found = align(scan, around, pose, _REACH)
-            if found is not None and found.held and (best is None or found.overlap > best[0].overlap):
+            if found is None or not found.held or found.seen_through > most_seen_through:
+                continue
+            if best is None or found.overlap > best[0].overlap:
                 best = found, around
         return best
 

@@ -30,6 +30,8 @@ _DROP = 0.85
 _LEAST = 0.4
 """Overlap of a pose that is believed, at least; as much more than another's must be to take its place."""
 _BETTER = 0.1
+_THROUGH = 0.01
+"""Share of the map's places that a scan may look through, more than scans usually do: what moved since."""
 _USUAL = 10
 """Scans that say what overlap is usual."""
 _MAPPED_MOVE, _MAPPED_TURN = 1.0, 0.03
@@ -64,6 +66,7 @@ class Tracker:
         """Scans since the last one that has a pose."""
         self._deviations: list[float] = []
         self._overlaps: deque[float] = deque(maxlen=_USUAL)
+        self._seen_through: deque[float] = deque(maxlen=_USUAL)
         self._last_mapped: Array | None = None
         self._number = 0
 
@@ -82,17 +85,24 @@ class Tracker:
         found = align(scan, self._map, prediction, self._partner_distance())
         status = ScanStatus.TRACKED
         if self._is_doubtful(found):
-            again = self._keyframes.find(scan, self._range)
+            again = self._keyframes.find(scan, self._range, self._most_seen_through())
             if again is not None and self._is_believed(again[0], found):
                 found, self._map = again
                 status = ScanStatus.RELOCALISED
+            elif found is not None and self._deviation(prediction, found) > self._partner_distance():
+                # Neither where it was expected nor as it should lie.
+                found = None
         if found is None or not found.held or found.overlap < _LEAST:
             self.skip()
             # Where the sensor went meanwhile, nobody knows.
             self._motion = np.eye(4)
             return Step(np.full((4, 4), np.nan), np.full((6, 6), np.nan), ScanStatus.LOST, 0.0)
         if status == ScanStatus.TRACKED:
-            self._learn(inverse(prediction) @ found.pose)
+            deviation = self._deviation(prediction, found)
+            if deviation > _STILL:
+                self._deviations.append(deviation)
+        self._overlaps.append(found.overlap)
+        self._seen_through.append(found.seen_through)
         return self._took(scan, found.pose, self._covariance(found), status, found.overlap)
 
     def _partner_distance(self) -> float:
@@ -103,14 +113,20 @@ class Tracker:
         deviation = float(np.sqrt(np.mean(np.square(squares))))
         return max(_NARROWEST, _SIGMAS * deviation * math.sqrt(self._since))
 
-    def _learn(self, off: Array) -> None:
-        """Remember by how much a prediction was wrong, at the median distance."""
-        deviation = 2.0 * self._reach * np.sin(0.5 * turned_by(off)) + float(np.linalg.norm(off[:3, 3]))
-        if deviation > _STILL:
-            self._deviations.append(deviation)
+    def _deviation(self, prediction: Array, found: Alignment) -> float:
+        """Tell by how much a prediction was wrong, at the median distance."""
+        off = inverse(prediction) @ found.pose
+        turned = 2.0 * self._reach * math.sin(0.5 * turned_by(off))
+        return turned + float(np.linalg.norm(off[:3, 3]))
 
     def _is_doubtful(self, found: Alignment | None) -> bool:
-        return found is None or not found.held or found.overlap < _DROP * self._usual()
+        if found is None or not found.held or found.overlap < _DROP * self._usual():
+            return True
+        return found.seen_through > self._most_seen_through()
+
+    def _most_seen_through(self) -> float:
+        usual = float(np.median(self._seen_through)) if self._seen_through else 0.0
+        return usual + _THROUGH
 
     def _is_believed(self, again: Alignment, found: Alignment | None) -> bool:
         """Tell whether a pose that was searched may take the place of the one that was expected."""
@@ -136,8 +152,6 @@ class Tracker:
             self._motion, self._last_mapped = np.eye(4), None
         elif self._since == 1:
             self._motion = inverse(self._last) @ pose
-        if len(self._map):
-            self._overlaps.append(overlap)
         if self._is_new(pose):
             self._map.add(moved(pose, scan.points), self._number)
             self._map.keep_within(pose[:3, 3], self._range)
