@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +15,33 @@ from surfsig import simulate
 
 Array = NDArray[np.float64]
 
-NOISE = 0.01
-"""Standard deviation of a measured distance, in metres."""
-RINGS, STEPS = 32, 480
-ELEVATION = np.radians(40.0)
-"""Of the highest ring; the lowest looks as far down."""
+
+@dataclass(frozen=True)
+class Lidar:
+    """Rings and steps of a sensor that looks along its x axis; angles in radians, lengths in metres."""
+
+    rings: int = 32
+    steps: int = 480
+    elevation: float = np.radians(40.0)
+    """Of the highest ring; the lowest looks as far down."""
+    azimuth: float = 2.0 * np.pi
+    """From the first to the last step."""
+    noise: float = 0.01
+    """Standard deviation of a measured distance."""
+
+    def rays(self) -> Array:
+        """Give unit vectors, (rings * steps, 3)."""
+        elevation, azimuth = np.meshgrid(
+            np.linspace(-self.elevation, self.elevation, self.rings),
+            (np.arange(self.steps) / self.steps - 0.5) * self.azimuth,
+            indexing="ij",
+        )
+        flat = np.cos(elevation)
+        rays = [flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)]
+        return np.stack(rays, axis=-1).reshape(-1, 3)
+
+
+LIDAR = Lidar()
 
 HEIGHT = 3.0
 # Walls: lowest and highest corner on the floor.
@@ -81,17 +104,12 @@ def way(count: int, places: Sequence[tuple[float, float]] = WAY) -> Array:
     return poses
 
 
-def scan(scene: simulate.Scene, pose: Array, seed: int) -> surfsig.PointCloud:
+def scan(scene: simulate.Scene, pose: Array, seed: int, lidar: Lidar = LIDAR) -> surfsig.PointCloud:
     """Scan from a pose T_building_sensor; in the sensor's own frame, in metres, float32."""
-    elevation, azimuth = np.meshgrid(
-        np.linspace(-ELEVATION, ELEVATION, RINGS), np.arange(STEPS) * 2 * np.pi / STEPS, indexing="ij"
-    )
-    rays = np.stack(
-        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], axis=-1
-    ).reshape(-1, 3)
+    rays = lidar.rays()
     hits = scene.cast(np.broadcast_to(pose[:3, 3], rays.shape), rays @ pose[:3, :3].T)
     met = np.isfinite(hits.t)
-    distances = hits.t[met] + np.random.default_rng([9, seed]).normal(0.0, NOISE, met.sum())
+    distances = hits.t[met] + np.random.default_rng([9, seed]).normal(0.0, lidar.noise, met.sum())
     points = (distances[:, None] * rays[met]).astype(np.float32)
     return surfsig.PointCloud(points, viewpoint=np.zeros(3))
 
@@ -103,6 +121,12 @@ def errors(found: Array, true: Array) -> tuple[Array, Array]:
     known = np.isfinite(off).all(axis=(1, 2))
     turned[known] = Rotation.from_matrix(off[known, :3, :3]).magnitude()
     return np.linalg.norm(off[:, :3, 3], axis=1), turned
+
+
+def missing_motions(found: Array, true: Array) -> Array:
+    """Give the small motions m of T_true = T_found exp(m), rotation vector first, (n, 6)."""
+    off = np.linalg.inv(found) @ np.linalg.inv(true[0]) @ true
+    return np.column_stack([Rotation.from_matrix(off[:, :3, :3]).as_rotvec(), off[:, :3, 3]])
 
 
 def _box(middle: Sequence[float], size: Sequence[float]) -> simulate.Placed:

@@ -9,13 +9,13 @@ import moving_sensor
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 import surfsig
 from surfsig import InvalidInputError, Odometry, PointCloud, ScanStatus, TimedScan, simulate
 from surfsig.odometry.alignment import Scan
 from surfsig.odometry.local_map import LocalMap
 from surfsig.odometry.motion import adjoint, small
+from surfsig.odometry.panorama import Panorama
 from surfsig.odometry.scale import Scale
 
 Array = NDArray[np.float64]
@@ -44,12 +44,6 @@ def found(walk: Walk) -> Odometry:
     return surfsig.odometry(walk.scans)
 
 
-def missing_motions(found: Odometry, true: Array) -> Array:
-    """Give the small motions m of T_true = T exp(m), (n, 6), to first order in the translation."""
-    off = np.linalg.inv(found.poses) @ np.linalg.inv(true[0]) @ true
-    return np.column_stack([Rotation.from_matrix(off[:, :3, :3]).as_rotvec(), off[:, :3, 3]])
-
-
 def test_drift_is_below_two_thousandths_of_the_way(found: Odometry, walk: Walk) -> None:
     assert found.counts() == {"tracked": 48, "relocalised": 0, "lost": 0, "too_few_points": 0}
     off, turned = moving_sensor.errors(found.poses, walk.true)
@@ -62,7 +56,7 @@ def test_drift_is_below_two_thousandths_of_the_way(found: Odometry, walk: Walk) 
 
 
 def test_covariances_are_as_large_as_the_errors(found: Odometry, walk: Walk) -> None:
-    motions = missing_motions(found, walk.true)[1:]
+    motions = moving_sensor.missing_motions(found.poses, walk.true)[1:]
     nees = np.einsum("ni,nij,nj->n", motions, np.linalg.inv(found.covariances[1:]), motions)
     # 6 for Gaussian errors whose covariance is known.
     assert 6 / 4 < nees.mean() < 6 * 4
@@ -191,3 +185,19 @@ def test_the_voxel_is_filled_as_often_as_said() -> None:
     assert len(Scan(points / scale.voxel, 1)) == pytest.approx(4000, rel=0.02)
     sparse = points[:1000]
     assert len(Scan(sparse / Scale.of(sparse, None).voxel, 1)) == pytest.approx(800, rel=0.02)
+
+
+def test_what_a_scan_looked_through() -> None:
+    """A ball of radius 50 around the sensor: what is within was looked through, what is beyond is hidden."""
+    rng = np.random.default_rng(3)
+    ways = rng.normal(size=(40_000, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    # Nothing was measured upwards.
+    seen = Panorama(50.0 * ways[ways[:, 2] < 0.5])
+    down, up = ways[ways[:, 2] < 0.4][:1000], ways[ways[:, 2] > 0.6][:1000]
+    assert seen.seen_through(30.0 * down) == 1.0
+    assert seen.seen_through(49.0 * down) == 0.0
+    assert seen.seen_through(80.0 * down) == 0.0
+    assert seen.seen_through(30.0 * up) == 0.0
+    both = np.concatenate([30.0 * down[:100], 50.0 * down[100:400], 80.0 * down[400:]])
+    assert seen.seen_through(both) == 0.25

@@ -85,7 +85,7 @@ def odometry(
     )
     workers = thread_count(threads) or os.cpu_count() or 1
     # What needs it is imported where it is there only.
-    library("small_gicp", "small_gicp", "'surfsig[clean]'")
+    library("small_gicp", "small_gicp", "'surfsig[register]'")
     from surfsig.odometry.way import Way
 
     way = Way(edge, partners, around, workers)
