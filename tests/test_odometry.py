@@ -82,7 +82,7 @@ def test_scans_without_a_place_do_not_stop_the_rest(walk: Walk) -> None:
         simulate.Scene([simulate.Placed(simulate.Box((1.0, 0.7, 0.5)))]), np.eye(4), seed=0
     )
     few = PointCloud(walk.scans[3].points[:49])
-    blind = PointCloud(np.full((500, 3), np.nan))
+    blind = PointCloud(np.concatenate([np.full((500, 3), np.nan), np.full((500, 3), 1e200)]))
     scans = [NOTHING, *walk.scans[:4], NOTHING, walk.scans[5], few, blind, elsewhere, *walk.scans[8:10]]
     result = surfsig.odometry(scans)
     few_points, lost = ScanStatus.TOO_FEW_POINTS, ScanStatus.LOST
@@ -134,6 +134,30 @@ def test_unit_and_place_of_the_frame_do_not_matter(walk: Walk) -> None:
         np.sqrt(np.diagonal(carried @ plain.covariances @ carried.T, axis1=1, axis2=2)),
         rtol=0.3,
     )
+
+
+def test_a_stray_point_far_away_does_not_make_the_voxel(walk: Walk) -> None:
+    stray = PointCloud(np.vstack([walk.scans[0].points, [[1e9, 0, 0]]]), viewpoint=np.zeros(3))
+    result = surfsig.odometry([stray, walk.scans[1]])
+    assert result.status.tolist() == [0, 0]
+    assert result.voxel == pytest.approx(surfsig.odometry(walk.scans[:1]).voxel, rel=0.05)
+
+
+def test_a_map_that_is_empty_is_no_new_beginning(walk: Walk) -> None:
+    """With no place in the map's range the second scan is lost, not the first of a new way."""
+    result = surfsig.odometry(walk.scans[:2], map_range=0.01)
+    assert result.status.tolist() == [ScanStatus.TRACKED, ScanStatus.LOST]
+
+
+def test_scans_in_coordinates_of_a_map_without_a_viewpoint(walk: Walk) -> None:
+    origin = np.array([5e5, 5e6, 100.0])
+    scans = [PointCloud(cloud.points, origin=origin) for cloud in walk.scans[:3]]
+    result = surfsig.odometry(scans)
+    assert result.status.tolist() == [0, 0, 0]
+    frame = np.eye(4)
+    frame[:3, 3] = origin
+    off, _ = moving_sensor.errors(np.linalg.inv(frame) @ result.poses @ frame, walk.true[:3])
+    assert off.max() < 0.01
 
 
 def test_scans_are_read_one_by_one(walk: Walk) -> None:

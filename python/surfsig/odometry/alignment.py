@@ -89,6 +89,8 @@ def align(scan: Scan, around: LocalMap, start: Array, reach: float) -> Alignment
     reach
         Voxels between partners, at most, to begin with.
     """
+    if len(around) < _FEWEST:
+        return None
     cloud, tree, normals = around.prepared()
     pose = start
     # One thread: several would add up in an order of their own.

@@ -70,5 +70,6 @@ def prepared(points: Array, threads: int) -> tuple[small_gicp.PointCloud, small_
 
 
 def _keys(points: Array) -> NDArray[np.int64]:
+    """Give the numbers of voxels; those a million apart share their number, as no map holds both."""
     steps = (np.floor(points).astype(np.int64) + _MIDDLE) & _WITHIN
     return np.asarray(steps @ np.array([1 << 42, 1 << 21, 1]))

@@ -15,6 +15,8 @@ _PLACES = 4000
 """Voxels of a scan that have points."""
 _MOST_OF_ALL = 0.8
 """Part of a sparse scan's points that are in voxels of their own."""
+_MOST = 99.0
+"""Percent of the points by which lengths are taken."""
 _HALVINGS = 24
 _PATCH = 0.35
 """Radius of the patches that find a place again, in units of the median distance from the median."""
@@ -34,8 +36,10 @@ class Scale:
     @classmethod
     def of(cls, points: Array, voxel: float | None) -> Scale:
         """Take the lengths from a scan, (n, 3), about its sensor."""
-        size = _voxel(points) if voxel is None else voxel
         spread = np.linalg.norm(points - np.median(points, axis=0), axis=1)
+        # A stray point may be anywhere.
+        most = points[spread <= np.percentile(spread, _MOST)]
+        size = _voxel(most) if voxel is None else voxel
         return cls(size, float(np.median(np.linalg.norm(points, axis=1))), _PATCH * float(np.median(spread)))
 
 

@@ -45,7 +45,8 @@ def odometry(
     scans
         In the order of time: what `scan_sequence` gives or takes as one path (a folder, a ROS bag), or an
         iterable of clouds, `TimedScan` or files; they are read one by one. Each is in its sensor's frame,
-        and taken from its viewpoint, where it has one, or from (0, 0, 0).
+        and taken from its viewpoint, where it has one, or from (0, 0, 0); where that is far from all points,
+        as in the coordinates of a map, the middle of the first scan stands for it.
     voxel
         In which scans and map are thinned, in the scans' unit; by default such that the first scan fills
         4,000.

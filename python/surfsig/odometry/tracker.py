@@ -79,7 +79,7 @@ class Tracker:
         """Find the pose of the next scan."""
         farthest = float(np.percentile(np.linalg.norm(scan.points, axis=1), 99.0)) * 1.2
         self._range = self._fixed_range or max(self._range, farthest)
-        if not len(self._map):
+        if not self._mapped:
             return self._took(scan, np.eye(4), np.zeros((6, 6)), ScanStatus.TRACKED, 1.0)
         prediction = self._last @ np.linalg.matrix_power(self._motion, self._since)
         found = align(scan, self._map, prediction, self._partner_distance())

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.clean import COORDINATE_LIMIT
 from surfsig.files.sequence import TimedScan
 from surfsig.odometry.alignment import Scan
 from surfsig.odometry.motion import adjoint
@@ -15,6 +18,9 @@ from surfsig.point_cloud import PointCloud
 
 Array = NDArray[np.float64]
 
+_FAR = 30.0
+"""Of a scan's median distance from its median: a sensor is not so far."""
+
 
 class Way:
     """Scans in their own unit in, poses in that unit out; `Tracker` counts in voxels about the sensor."""
@@ -24,6 +30,7 @@ class Way:
     ) -> None:
         self._voxel, self._distance, self._map_range, self._threads = voxel, distance, map_range, threads
         self._scale: Scale | None = None
+        self._middle: Array | None = None
         self._steps: list[tuple[float, Array, Array, ScanStatus, float]] = []
 
     def __len__(self) -> int:
@@ -50,8 +57,10 @@ class Way:
 
     def _step(self, cloud: PointCloud) -> tuple[Step | None, Array]:
         """Follow a scan's points about its sensor, and say where that is; None where they are too few."""
-        sensor = np.zeros(3) if cloud.viewpoint is None else cloud.viewpoint
-        points = cloud.offsets[cloud.finite] + (cloud.origin - sensor)
+        with np.errstate(invalid="ignore"):
+            known = cloud.offsets[(np.abs(cloud.offsets) < COORDINATE_LIMIT).all(axis=1)]
+        sensor = self._sensor(cloud.viewpoint, known, cloud.origin)
+        points = known + (cloud.origin - sensor)
         if len(points) >= FEWEST and np.ptp(points, axis=0).any():
             if self._scale is None:
                 self._begin(points, sensor)
@@ -62,6 +71,21 @@ class Way:
         if self._scale is not None:
             self._tracker.skip()
         return None, sensor
+
+    def _sensor(self, viewpoint: Array | None, points: NDArray[Any], origin: Array) -> Array:
+        """Say where the sensor is in its scan's frame.
+
+        Where nobody does, it is at 0; in the coordinates of a map, 0 is far from all points, and the middle
+        of the first scan stands for it.
+        """
+        if viewpoint is not None:
+            return viewpoint
+        if self._middle is None and len(points):
+            middle = np.median(points, axis=0)
+            spread = float(np.median(np.linalg.norm(points - middle, axis=1)))
+            far = float(np.linalg.norm(middle + origin)) > _FAR * spread
+            self._middle = middle + origin if far else np.zeros(3)
+        return np.zeros(3) if self._middle is None else self._middle
 
     def _begin(self, points: Array, sensor: Array) -> None:
         """Take the lengths from the first scan."""
