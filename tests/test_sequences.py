@@ -147,7 +147,8 @@ def test_the_clouds_of_a_bag(tmp_path: Path, kind: str, name: str) -> None:
     for _ in range(2):
         scans = list(sequence)
         assert [scan.timestamp for scan in scans] == [1700000000.25 + number for number in range(3)]
-    for number, (_, cloud) in enumerate(scans):
+    for number, scan in enumerate(scans):
+        cloud = scan.cloud
         table = rows(number)
         expected = np.column_stack([table[axis] for axis in "xyz"])
         np.testing.assert_array_equal(cloud.points, expected)

@@ -7,8 +7,9 @@ import os
 import re
 import warnings
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,8 @@ _NANOSECONDS_DIGITS = 16
 """Digits from which on a whole number counts nanoseconds: as seconds it would lie beyond any clock's time."""
 
 
-class TimedScan(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class TimedScan:
     """A scan, and when it was taken.
 
     Attributes
@@ -72,7 +74,7 @@ class ScanSequence:
 
     def _scans_of(self, part: Path | BagTopic) -> Iterator[tuple[float | None, PointCloud]]:
         if isinstance(part, Path):
-            yield None, scan_or_none(part, **self._reading)
+            yield None, scan_or_empty(part, **self._reading)
             return
         try:
             yield from part
@@ -97,7 +99,7 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
     Returns
     -------
     ScanSequence
-        Gives (timestamp, cloud). A timestamp is that in a message's header; the number that the file's name
+        Gives a `TimedScan` each. A timestamp is that in a message's header; the number that the file's name
         is, in seconds (a whole number of 16 digits or more counts nanoseconds), where all names are numbers
         that grow; otherwise the scan's number.
 
@@ -137,7 +139,7 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
     return ScanSequence(parts, reading)
 
 
-def scan_or_none(path: Path, **reading: Any) -> PointCloud:
+def scan_or_empty(path: Path, **reading: Any) -> PointCloud:
     """Read a scan; one that is broken gives a warning and no points, so that the others can be used."""
     from surfsig.files import read
 

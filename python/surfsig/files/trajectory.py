@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +19,8 @@ TrajectoryFormat = Literal["kitti", "tum"]
 _COLUMNS = {"kitti": 12, "tum": 8}
 
 
-class Trajectory(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Trajectory:
     """Poses of a file.
 
     Attributes

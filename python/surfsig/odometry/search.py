@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from surfsig.arguments import positive_length, thread_count
 from surfsig.convert.libraries import library
 from surfsig.errors import InvalidInputError
-from surfsig.files.sequence import ScanSequence, TimedScan, scan_or_none, scan_sequence
+from surfsig.files.sequence import ScanSequence, TimedScan, scan_or_empty, scan_sequence
 from surfsig.odometry.result import Odometry
 from surfsig.point_cloud import PointCloud
 
@@ -110,6 +110,6 @@ def _timed(scans: Any) -> Iterator[TimedScan]:
         if isinstance(scan, TimedScan):
             yield TimedScan(float(scan.timestamp), PointCloud.of(scan.cloud))
         elif isinstance(scan, (str, os.PathLike)):
-            yield TimedScan(float(number), scan_or_none(Path(scan)))
+            yield TimedScan(float(number), scan_or_empty(Path(scan)))
         else:
             yield TimedScan(float(number), PointCloud.of(scan))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -57,8 +55,8 @@ class Way:
 
     def _step(self, cloud: PointCloud) -> tuple[Step | None, Array]:
         """Follow a scan's points about its sensor, and say where that is; None where they are too few."""
-        with np.errstate(invalid="ignore"):
-            known = cloud.offsets[(np.abs(cloud.offsets) < COORDINATE_LIMIT).all(axis=1)]
+        offsets = cloud.offsets.astype(np.float64)
+        known = offsets[(np.abs(offsets) < COORDINATE_LIMIT).all(axis=1)]
         sensor = self._sensor(cloud.viewpoint, known, cloud.origin)
         points = known + (cloud.origin - sensor)
         if len(points) >= FEWEST and np.ptp(points, axis=0).any():
@@ -72,7 +70,7 @@ class Way:
             self._tracker.skip()
         return None, sensor
 
-    def _sensor(self, viewpoint: Array | None, points: NDArray[Any], origin: Array) -> Array:
+    def _sensor(self, viewpoint: Array | None, points: Array, origin: Array) -> Array:
         """Say where the sensor is in its scan's frame.
 
         Where nobody does, it is at 0; in the coordinates of a map, 0 is far from all points, and the middle
