@@ -36,10 +36,10 @@ WAY_COLUMNS = (
     "error² over covariance", "scans/s",
 )  # fmt: skip
 BACK_COLUMNS = ("carried to", "scans", "found, right", "found, wrong", "lost")
-CARRIED = 10
+CARRIED = 12
 RIGHT = 0.1
 """Metres within which a place is right."""
-BUILDINGS = range(4)
+BUILDINGS = range(2)
 
 
 def main() -> None:

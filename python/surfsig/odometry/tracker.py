@@ -25,6 +25,8 @@ _START = 0.1
 """Of the median distance that scans see: deviation of a prediction before any is known."""
 _STILL = 0.1
 """Voxels: a deviation below it says nothing about motion."""
+_MOST, _BEYOND = 99.0, 1.2
+"""Percent of a scan's places that the map must hold, and how much farther it goes."""
 _DROP = 0.85
 """Of the usual overlap: below, a pose is doubted, and one that was searched not believed."""
 _LEAST = 0.4
@@ -64,7 +66,8 @@ class Tracker:
         self._motion: Array = np.eye(4)
         self._since = 1
         """Scans since the last one that has a pose."""
-        self._deviations: list[float] = []
+        self._squares, self._predictions = (_START * reach) ** 2, 1
+        """Sum of the squared deviations of predictions, and their number."""
         self._overlaps: deque[float] = deque(maxlen=_USUAL)
         self._seen_through: deque[float] = deque(maxlen=_USUAL)
         self._last_mapped: Array | None = None
@@ -77,8 +80,8 @@ class Tracker:
 
     def follow(self, scan: Scan) -> Step:
         """Find the pose of the next scan."""
-        farthest = float(np.percentile(np.linalg.norm(scan.points, axis=1), 99.0)) * 1.2
-        self._range = self._fixed_range or max(self._range, farthest)
+        farthest = float(np.percentile(np.linalg.norm(scan.points, axis=1), _MOST))
+        self._range = self._fixed_range or max(self._range, _BEYOND * farthest)
         if not self._mapped:
             return self._took(scan, np.eye(4), np.zeros((6, 6)), ScanStatus.TRACKED, 1.0)
         prediction = self._last @ np.linalg.matrix_power(self._motion, self._since)
@@ -100,7 +103,7 @@ class Tracker:
         if status == ScanStatus.TRACKED:
             deviation = self._deviation(prediction, found)
             if deviation > _STILL:
-                self._deviations.append(deviation)
+                self._squares, self._predictions = self._squares + deviation**2, self._predictions + 1
         self._overlaps.append(found.overlap)
         self._seen_through.append(found.seen_through)
         return self._took(scan, found.pose, self._covariance(found), status, found.overlap)
@@ -109,9 +112,8 @@ class Tracker:
         """Let partners be as far as predictions were wrong (as in KISS-ICP, Vizzo and others 2023)."""
         if self._distance is not None:
             return self._distance
-        squares = [_START * self._reach, *self._deviations]
-        deviation = float(np.sqrt(np.mean(np.square(squares))))
-        return max(_NARROWEST, _SIGMAS * deviation * math.sqrt(self._since))
+        variance = self._squares / self._predictions
+        return max(_NARROWEST, _SIGMAS * math.sqrt(variance * self._since))
 
     def _deviation(self, prediction: Array, found: Alignment) -> float:
         """Tell by how much a prediction was wrong, at the median distance."""
