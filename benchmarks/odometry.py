@@ -24,22 +24,22 @@ import surfsig
 from surfsig import ScanStatus, simulate
 
 SENSORS = {
-    "lidar, 32 rings": (Lidar(), 220),
-    "the same, noise 30 mm": (Lidar(noise=0.03), 220),
+    "lidar, 32 rings": (Lidar(), 110),
+    "the same, noise 30 mm": (Lidar(noise=0.03), 110),
     "the same, every 0.5 m": (Lidar(), 48),
-    "lidar, 16 rings, 30° high": (Lidar(16, 900, np.radians(15.0), noise=0.02), 220),
+    "lidar, 16 rings, 30° high": (Lidar(16, 900, np.radians(15.0), noise=0.02), 110),
     "lidar, 8 rings": (Lidar(8, 360, np.radians(30.0)), 110),
-    "camera, 90° x 60°": (Lidar(96, 160, np.radians(30.0), np.radians(90.0), 0.005), 220),
+    "camera, 90° x 60°": (Lidar(96, 160, np.radians(30.0), np.radians(90.0), 0.005), 110),
 }
 WAY_COLUMNS = (
     "sensor", "scans", "points each", "tracked", "largest error of place", "of the way", "of direction",
     "error² over covariance", "scans/s",
 )  # fmt: skip
 BACK_COLUMNS = ("carried to", "scans", "found, right", "found, wrong", "lost")
-CARRIED = 12
+CARRIED = 10
 RIGHT = 0.1
 """Metres within which a place is right."""
-BUILDINGS = range(2)
+BUILDINGS = range(1)
 
 
 def main() -> None:
