@@ -29,6 +29,7 @@ from surfsig.files import (
     write,
     write_trajectory,
 )
+from surfsig.finding import Instance, Instances, Library, LibraryEntry, find
 from surfsig.flat_atom import flat_atom_length
 from surfsig.odometry import Odometry, ScanStatus, odometry
 from surfsig.point_cloud import PointCloud
@@ -47,7 +48,11 @@ __all__ = [
     "FitUsed",
     "FittedShape",
     "Frame",
+    "Instance",
+    "Instances",
     "InvalidInputError",
+    "Library",
+    "LibraryEntry",
     "Odometry",
     "PointClass",
     "PointCloud",
@@ -68,6 +73,7 @@ __all__ = [
     "extract",
     "extract_radii",
     "field_signatures",
+    "find",
     "fit_cylinder",
     "fit_plane",
     "fit_sphere",

@@ -67,3 +67,6 @@ KEYPOINT_CANDIDATES = 8.0
 
 REGISTRATION_KEYPOINTS = 1000
 """Of each scan that is registered."""
+
+INSTANCE_SCORE = 0.25
+"""Of a model in a scene, at least: half hidden ones have about 0.4, and what is not there below 0.2."""

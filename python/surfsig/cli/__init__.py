@@ -17,8 +17,10 @@ from surfsig.cli.compare import compare_command
 from surfsig.cli.completion import completion_command
 from surfsig.cli.convert import convert_command
 from surfsig.cli.extract import extract_command
+from surfsig.cli.find import find_command
 from surfsig.cli.fit import fit_command
 from surfsig.cli.info import info_command
+from surfsig.cli.library import library_command
 from surfsig.cli.odometry import odometry_command
 from surfsig.cli.paper import paper_command
 from surfsig.cli.register import register_command
@@ -57,6 +59,8 @@ for command in (
     surfaces_command,
     register_command,
     odometry_command,
+    find_command,
+    library_command,
     compare_command,
     convert_command,
     paper_command,

@@ -56,7 +56,16 @@ class Registration:
         )
 
     def apply(self, points: ArrayLike) -> Array:
-        """Move points of the source, (n, 3), into the target.
+        """Move points of the source into the target.
+
+        Parameters
+        ----------
+        points
+            (n, 3), in the source's coordinates.
+
+        Returns
+        -------
+        (n, 3) in the target's; NaN where no pose is known.
 
         Raises
         ------
@@ -68,11 +77,26 @@ class Registration:
         return np.asarray(places @ rotation.T + shift)
 
     def moved(self, cloud: PointCloud) -> PointCloud:
-        """Move a cloud of the source into the target, its viewpoint and normals with it."""
+        """Move a cloud of the source into the target, its viewpoint and normals with it.
+
+        Parameters
+        ----------
+        cloud
+            In the source's coordinates.
+
+        Returns
+        -------
+        A cloud of its own, with all fields.
+        """
         return moved(cloud, self.T_target_source)
 
     def values(self) -> dict[str, Any]:
-        """Give everything as plain numbers, for JSON; None for what is not known."""
+        """Give everything as plain numbers, for JSON; None for what is not known.
+
+        Returns
+        -------
+        By the names of the attributes; matrices row by row.
+        """
         known = bool(np.isfinite(self.T_target_source).all())
         return {
             "T_target_source": self.T_target_source.tolist() if known else None,

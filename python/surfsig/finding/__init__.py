@@ -1,0 +1,7 @@
+"""Where instances of models are in a scene: `find`; and models in a file: `Library`."""
+
+from surfsig.finding.instances import Instance, Instances
+from surfsig.finding.library import Library, LibraryEntry
+from surfsig.finding.search import find
+
+__all__ = ["Instance", "Instances", "Library", "LibraryEntry", "find"]

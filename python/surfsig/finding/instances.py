@@ -1,0 +1,181 @@
+"""What `find` gives: instances of models, each with its pose."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from surfsig.point_cloud import PointCloud
+from surfsig.recurrences.free_directions import FreeDirection
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Instance:
+    """A model that is in a scene."""
+
+    name: str
+    """The model's; "model" where only one was looked for."""
+    T_scene_model: Array
+    """(4, 4): a point p of the model is at R p + t of the scene."""
+    covariance: Array
+    """(6, 6), of the small motion (rotation vector in radians, then translation) in the scene's axes, about
+    `center`, that brings the given pose onto the true one."""
+    center: Array
+    """Middle of what touches the scene's points, (3,), in the scene's coordinates."""
+    score: float
+    """What of the model is confirmed, less what is wrong, over the most of it that can be seen at once."""
+    visible: float
+    """Share of the surface facing the sensor that is seen, 0 to 1; of all of it where the sensor's place is
+    not known."""
+    overlap: float
+    """Share of the model's whole surface that lies on the scene's, 0 to 1."""
+    rms: float
+    """Root mean square of the distances there, in the clouds' unit."""
+    free_directions: list[FreeDirection]
+    """Motions, in the scene's coordinates, in which what is seen does not hold the model."""
+    indices: NDArray[np.int64]
+    """Numbers of the scene's points that are the instance's, ascending."""
+
+    def __repr__(self) -> str:
+        """Say what it is."""
+        free = "".join(f", {direction}" for direction in self.free_directions)
+        return (
+            f"Instance({self.name}: score {self.score:.2f}, {self.visible:.0%} visible, "
+            f"{len(self.indices)} points, rms {self.rms:.3g}{free})"
+        )
+
+    def values(self) -> dict[str, Any]:
+        """Give everything as plain numbers, lists and dictionaries; of the points their number."""
+        return {
+            "name": self.name,
+            "T_scene_model": self.T_scene_model.tolist(),
+            "covariance": self.covariance.tolist(),
+            "center": self.center.tolist(),
+            "score": self.score,
+            "visible": self.visible,
+            "overlap": self.overlap,
+            "rms": self.rms,
+            "free_directions": [free.values() for free in self.free_directions],
+            "points": len(self.indices),
+        }
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Instances:
+    """All instances in a scene, the best first; a sequence of `Instance`."""
+
+    instances: list[Instance]
+    cloud: PointCloud
+    """The scene."""
+
+    def __len__(self) -> int:
+        """Return the number of instances."""
+        return len(self.instances)
+
+    def __getitem__(self, number: int) -> Instance:
+        return self.instances[number]
+
+    def __repr__(self) -> str:
+        lines = (f"  {number}: {instance!r}" for number, instance in enumerate(self.instances))
+        return "\n".join([f"Instances({self.summary()})", *lines])
+
+    @property
+    def labels(self) -> NDArray[np.int32]:
+        """Of each point of the scene the number of its instance, (n,); -1 for none."""
+        labels = np.full(len(self.cloud), -1, np.int32)
+        for number, instance in enumerate(self.instances):
+            labels[instance.indices] = number
+        return labels
+
+    def summary(self) -> str:
+        """Say in words how many there are: "5 instances (3 of cup, 2 of plate)", or "not there"."""
+        if not self.instances:
+            return "not there"
+        counts = Counter(instance.name for instance in self.instances)
+        what = ", ".join(f"{count} of {name}" for name, count in sorted(counts.items()))
+        return f"{len(self)} instance{'s' if len(self) > 1 else ''} ({what})"
+
+    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Describe the instances for people.
+
+        Returns
+        -------
+        The names of the columns, and a row for each: its number, the model's name, score, visible share,
+        where the model's origin is, its turn as a rotation vector in degrees, rms, points, free directions.
+        """
+        header = (
+            "",
+            "model",
+            "score",
+            "visible",
+            "at",
+            "turned, degrees",
+            "rms",
+            "points",
+            "free directions",
+        )
+        rows: list[tuple[str, ...]] = []
+        for number, instance in enumerate(self.instances):
+            turn = Rotation.from_matrix(instance.T_scene_model[:3, :3]).as_rotvec(degrees=True)
+            rows.append(
+                (
+                    f"{number}",
+                    instance.name,
+                    f"{instance.score:.2f}",
+                    f"{instance.visible:.0%}",
+                    " ".join(f"{value:.5g}" for value in instance.T_scene_model[:3, 3]),
+                    " ".join(f"{value:.1f}" for value in turn),
+                    f"{instance.rms:.2g}",
+                    f"{len(instance.indices)}",
+                    "; ".join(map(str, instance.free_directions)) or "none",
+                )
+            )
+        return header, rows
+
+    def values(self) -> dict[str, Any]:
+        """Give all as plain numbers, lists and dictionaries, for JSON: summary, and instances."""
+        return {
+            "summary": self.summary(),
+            "instances": [{"number": n, **instance.values()} for n, instance in enumerate(self.instances)],
+        }
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Give the instances as a pandas DataFrame, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            name, score, visible, overlap, rms, points, qx, qy, qz, qw, tx, ty, tz (T_scene_model: unit
+            quaternion, shift), free (the free directions in words).
+
+        Raises
+        ------
+        InvalidInputError
+            If pandas is not installed.
+        """
+        from surfsig.convert.libraries import library
+
+        pandas = library("pandas", "pandas", "pandas")
+        rows = []
+        for instance in self.instances:
+            row: dict[str, Any] = {"name": instance.name, "score": instance.score}
+            row |= {"visible": instance.visible, "overlap": instance.overlap, "rms": instance.rms}
+            row["points"] = len(instance.indices)
+            turn = Rotation.from_matrix(instance.T_scene_model[:3, :3]).as_quat()
+            row |= dict(zip(("qx", "qy", "qz", "qw"), turn, strict=True))
+            row |= dict(zip(("tx", "ty", "tz"), instance.T_scene_model[:3, 3], strict=True))
+            row["free"] = "; ".join(str(direction) for direction in instance.free_directions)
+            rows.append(row)
+        names = ["name", "score", "visible", "overlap", "rms", "points"]
+        names += ["qx", "qy", "qz", "qw", "tx", "ty", "tz", "free"]
+        return pandas.DataFrame(rows, columns=names)

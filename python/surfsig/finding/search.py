@@ -1,0 +1,210 @@
+"""`find`: all instances of models in a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from surfsig.arguments import thread_count
+from surfsig.defaults import INSTANCE_SCORE
+from surfsig.errors import InvalidInputError
+from surfsig.finding.evidence import Witness
+from surfsig.finding.instances import Instance, Instances
+from surfsig.finding.library import Library
+from surfsig.finding.model import FEWEST, SPACINGS, Model, model_of
+from surfsig.finding.proposals import proposed_poses
+from surfsig.finding.scene import Scene
+from surfsig.point_cloud import PointCloud
+from surfsig.recurrences.free_directions import free_directions
+from surfsig.registration.contact import Surface, contact
+from surfsig.registration.motion import shifted
+
+Array = NDArray[np.float64]
+
+_PROPOSALS, _TRIED = 1000, 60
+"""Poses that are settled and judged by few places, and of those that differ, by all."""
+_SPACINGS_APART = 1.5
+"""Of the scene's point spacings, between places at least: steep surfaces have fewer points."""
+_COARSE = 2.0
+"""Voxels of the first judgement, in those of the last."""
+_FEW = 600
+"""Places of the model that are looked at in the first judgement."""
+_SAME_MIDDLE, _SAME_TURN = 0.25, 0.2
+"""Radii of a patch, and radians, within which two poses are one."""
+_OWN = 1.5
+"""Voxels from an instance's surface within which the scene's points are its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    name: str
+    witness: Witness
+    model: Model
+    pose: Array
+
+
+def find(
+    model: PointCloud | ArrayLike | Library | Mapping[str, PointCloud | ArrayLike],
+    scene: PointCloud | ArrayLike,
+    *,
+    score: float = INSTANCE_SCORE,
+    threads: int | None = None,
+) -> Instances:
+    """Find every instance of a model, or of several, in a scene: pose, score, and how much of it is seen.
+
+    Each place of the scene proposes a pose by the place of the model whose field signature is most like its
+    own. Poses that many agree on are fitted to the scene's surface and judged by what the sensor saw: what of
+    the model is confirmed by points, less what it saw through and where it saw nothing. The best is taken,
+    with its points, and the others are judged again without these, until none is left that is good enough. So
+    half hidden instances are found, and where there is none, none is. The result is always the same.
+
+    Parameters
+    ----------
+    model
+        `PointCloud`, array (n, 3) of numbers, or any other that `PointCloud.of` takes: a whole object, or one
+        view of it; a `Library`, or a mapping of names to clouds, for several. In the scene's unit.
+    scene
+        A cloud alike. Where it has a viewpoint, or one for each value of its field ``scan``, free space
+        counts, or where all of it can have been seen from its origin; otherwise only what is confirmed does,
+        and instances that are none are found, too: a higher `score` leaves them out.
+    score
+        Of an instance, at least: 1 is as much as can be seen of the model at once, with nothing against it.
+    threads
+        Number of threads; all cores by default. The result is the same.
+
+    Returns
+    -------
+    Instances
+        The best first; empty where there is none.
+
+    Raises
+    ------
+    InvalidInputError
+        If an argument has no meaning; its text says which.
+    FileFormatError
+        If a library's file is damaged.
+    """
+    least = _score(score)
+    threads = thread_count(threads)
+    cloud = PointCloud.of(scene)
+    models = _models(model, threads)
+    if int(cloud.finite.sum()) < FEWEST or not models:
+        return Instances([], cloud)
+    candidates: list[_Candidate] = []
+    prepared = Scene(cloud, min(part.radius for part in models.values()), threads)
+    eye = prepared.eye() if prepared.sided else None
+    for name, part in models.items():
+        candidates += _candidates(name, part, prepared, eye, least, threads)
+    return _accepted(candidates, prepared, least)
+
+
+def _models(model: object, threads: int | None) -> dict[str, Model]:
+    if isinstance(model, Library):
+        return {name: model.model(name) for name in model.names()}
+    if isinstance(model, Mapping) and all(isinstance(name, str) for name in model):
+        return {name: model_of(data, threads=threads) for name, data in model.items()}
+    return {"model": model_of(PointCloud.of(model), threads=threads)}
+
+
+def _score(value: float) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not 0.0 < number <= 1.0:
+        raise InvalidInputError(f"score must be a number above 0 and up to 1, not {value!r:.40}")
+    return number
+
+
+def _candidates(
+    name: str, model: Model, scene: Scene, eye: Array | None, least: float, threads: int | None
+) -> list[_Candidate]:
+    """Give poses of a model that are good enough where no other instance is near."""
+    if model.radius < SPACINGS * scene.spacing:
+        model = model.with_radius(SPACINGS * scene.spacing, threads)
+    voxel = max(model.voxel, model.spacing, _SPACINGS_APART * scene.spacing)
+    signatures = scene.signatures(model.radius)
+    coarse, fine = scene.surroundings(_COARSE * voxel), scene.surroundings(voxel)
+    sides = [model] if model.sided and scene.sided else [model, model.inside_out(threads)]
+    found: list[tuple[float, _Candidate]] = []
+    for side in sides:
+        first, last = Witness(side, coarse, eye, _FEW), Witness(side, fine, eye, None)
+        settled = [first.settled(pose) for pose in proposed_poses(side.signatures, signatures, _PROPOSALS)]
+        scores = [first.judged(pose, coarse.all_free).score for pose in settled]
+        poses = [settled[number] for number in np.argsort(-np.array(scores), kind="stable")]
+        for pose in _different(poses, side.radius)[:_TRIED]:
+            better = last.settled(pose)
+            score = last.judged(better, fine.all_free).score
+            if score >= least:
+                found.append((score, _Candidate(name, last, side, better)))
+    return [candidate for _, candidate in sorted(found, key=lambda pair: -pair[0])]
+
+
+def _different(poses: list[Array], radius: float) -> list[Array]:
+    """Leave out poses that are one with an earlier one."""
+    kept: list[Array] = []
+    for pose in poses:
+        for other in kept:
+            near = np.linalg.norm(pose[:3, 3] - other[:3, 3]) < _SAME_MIDDLE * radius
+            if near and Rotation.from_matrix(pose[:3, :3].T @ other[:3, :3]).magnitude() < _SAME_TURN:
+                break
+        else:
+            kept.append(pose)
+    return kept
+
+
+def _accepted(candidates: list[_Candidate], scene: Scene, least: float) -> Instances:
+    """Take the best candidate and its part of the scene away, until none is good enough."""
+    instances: list[Instance] = []
+    taken = np.zeros(len(scene.points), np.bool_)
+    while candidates:
+        judged = [c.witness.judged(c.pose, c.witness.around.free) for c in candidates]
+        scores = np.array([evidence.score for evidence in judged])
+        kept = np.flatnonzero(scores >= least)
+        if not len(kept):
+            break
+        best = candidates[kept[np.argmax(scores[kept])]]
+        found = _instance(best, scene, taken)
+        if found is not None and found.score >= least:
+            instances.append(found)
+        candidates = [candidates[number] for number in kept if candidates[number] is not best]
+    instances.sort(key=lambda instance: -instance.score)
+    return Instances(instances, scene.given)
+
+
+def _instance(candidate: _Candidate, scene: Scene, taken: NDArray[np.bool_]) -> Instance | None:
+    """Fit the last steps, and take what is explained away."""
+    witness, model = candidate.witness, candidate.model
+    around = witness.around
+    facing = witness.facing(candidate.pose)
+    touching = contact(
+        witness.places[facing], Surface(around.places, around.voxel), candidate.pose, around.voxel
+    )
+    if touching is None:
+        return None
+    evidence = witness.judged(touching.pose, around.free)
+    surface = cKDTree(model.places @ touching.pose[:3, :3].T + touching.pose[:3, 3])
+    reach = _OWN * around.voxel
+    for part in scene.parts():
+        near, _ = surface.query(part.places, distance_upper_bound=reach)
+        part.free[np.isfinite(near)] = False
+    near, _ = surface.query(scene.points, distance_upper_bound=reach)
+    own = np.isfinite(near) & ~taken
+    taken |= own
+    return Instance(
+        name=candidate.name,
+        T_scene_model=shifted(scene.middle) @ touching.pose @ shifted(-model.middle),
+        covariance=touching.covariance,
+        center=touching.center + scene.middle,
+        score=evidence.score,
+        visible=evidence.visible,
+        overlap=touching.overlap * float(facing.mean()),
+        rms=touching.rms,
+        free_directions=free_directions(touching.places + scene.middle, touching.normals),
+        indices=scene.numbers[own],
+    )

@@ -1,0 +1,118 @@
+"""Instances of models: in simulated scenes of known poses, and in real ones."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from finding import errors, scored
+from finding_scene import finding_scene, whole
+
+import surfsig
+from surfsig.finding.visible_from import seen_from
+
+
+@pytest.fixture(scope="module")
+def five() -> surfsig.Instances:
+    """What is found in a scene of five half hidden copies."""
+    return surfsig.find(whole("figure"), finding_scene("figure", 1).cloud)
+
+
+def test_five_half_hidden_copies_are_all_found_and_nothing_else(five: surfsig.Instances) -> None:
+    scene = finding_scene("figure", 1)
+    assert (scene.hidden > 0.45).all()
+    score = scored(scene, five)
+    assert (score.right, score.false) == (5, 0)
+    assert score.shift < 0.001
+    assert score.turn < 1.0
+    for instance in five.instances:
+        assert 0.4 < instance.visible <= 1.0
+        points = scene.cloud.points[instance.indices]
+        assert np.linalg.norm(points - instance.center, axis=1).max() < 0.06
+        assert np.linalg.eigvalsh(instance.covariance).min() > 0.0
+
+
+def test_instances_say_the_same_in_every_form(five: surfsig.Instances) -> None:
+    frame, values = five.to_pandas(), five.values()["instances"]
+    header, rows = five.table()
+    assert len(frame) == len(values) == len(rows) == len(five) == 5
+    assert {len(row) for row in rows} == {len(header)}
+    assert five.summary() == "5 instances (5 of model)"
+    for number, instance in enumerate(five.instances):
+        assert frame["tx"][number] == values[number]["T_scene_model"][0][3] == instance.T_scene_model[0, 3]
+        assert (five.labels == number).sum() == len(instance.indices) == values[number]["points"]
+
+
+def test_what_is_not_there_is_not_found() -> None:
+    found = surfsig.find(whole("figure"), finding_scene("figure", 1, copies=0, others=6).cloud)
+    assert len(found) == 0
+    assert found.summary() == "not there"
+    assert (found.labels == -1).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "model", "truth"),
+    [
+        ("milk", "milk.pcd", "T_scene_from_milk_DERIVED.txt"),
+        ("chef", "chef.pcd", "T_rs1_from_chef_DERIVED.txt"),
+    ],
+)
+def test_real_objects_are_found_once_each(shared_data: Path, name: str, model: str, truth: str) -> None:
+    folder = shared_data / "objects" / name
+    cloud = surfsig.read(folder / model)
+    found = surfsig.find(cloud, surfsig.read(folder / "scene.pcd"))
+    assert len(found) == 1
+    # The chef's own origin is 0.6 m away from it: errors are those of its middle.
+    middle = np.eye(4)
+    middle[:3, 3] = np.median(cloud.points, axis=0)
+    shift, turn = errors(found[0].T_scene_model @ middle, np.loadtxt(folder / truth) @ middle)
+    assert shift < 0.005
+    assert turn < 2.0
+
+
+def test_real_objects_are_not_found_in_each_others_scene(shared_data: Path) -> None:
+    objects = shared_data / "objects"
+    for name, other in (("milk", "chef"), ("chef", "milk")):
+        model = surfsig.read(objects / name / f"{name}.pcd")
+        assert len(surfsig.find(model, surfsig.read(objects / other / "scene.pcd"))) == 0
+
+
+def test_far_away_coordinates_change_nothing() -> None:
+    scene, far = finding_scene("figure", 2, copies=1, others=1), np.array([5e5, 5e6, 100.0])
+    moved = surfsig.PointCloud(scene.cloud.offsets, origin=far, viewpoint=far)
+    found = surfsig.find(whole("figure"), moved)
+    assert len(found) == 1
+    pose = found[0].T_scene_model.copy()
+    pose[:3, 3] -= far
+    assert errors(pose, scene.poses[0])[0] < 0.001
+
+
+def test_a_scene_in_its_sensor_s_axes_needs_no_viewpoint(five: surfsig.Instances) -> None:
+    scene = finding_scene("figure", 1)
+    found = surfsig.find(whole("figure"), surfsig.PointCloud(scene.cloud.offsets))
+    assert [instance.score for instance in found.instances] == [instance.score for instance in five.instances]
+
+
+def test_a_closed_surface_is_not_seen_from_one_place() -> None:
+    ways = np.random.default_rng(0).normal(size=(20_000, 3))
+    ball = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    eye = np.array([0.0, 0.0, 10.0])
+    assert not seen_from(eye, ball, 0.02)
+    assert seen_from(eye, ball[ball[:, 2] > 0.1], 0.02)
+
+
+@pytest.mark.parametrize("score", [0.0, 1.5, np.nan, "much"])
+def test_a_score_without_meaning_is_said(score: float) -> None:
+    with pytest.raises(surfsig.InvalidInputError, match="score must be"):
+        surfsig.find(np.zeros((100, 3)), np.zeros((100, 3)), score=score)
+
+
+def test_models_without_extent_or_points_are_said() -> None:
+    with pytest.raises(surfsig.InvalidInputError, match="50 finite points"):
+        surfsig.find(np.zeros((10, 3)), np.zeros((100, 3)))
+    with pytest.raises(surfsig.InvalidInputError, match="one place"):
+        surfsig.find(np.zeros((100, 3)), np.zeros((100, 3)))
+
+
+def test_nothing_is_in_an_empty_scene() -> None:
+    assert len(surfsig.find(whole("figure"), np.zeros((0, 3)))) == 0
+    assert len(surfsig.find(whole("figure"), np.zeros((100, 3)))) == 0
