@@ -56,23 +56,24 @@ FRAMES = ((9.5, 2.0), (11.3, 4.0), (13.4, 2.0), (15.2, 2.0), (16.9, 4.0), (18.8,
 WAY = ((2, 2), (3.5, 3.6), (6, 3.2), (9, 3), (14, 3.1), (19, 3), (22, 3), (24, 3.8), (25.5, 2.6))
 
 
-def building(seed: int = 0) -> simulate.Scene:
-    """Build the rooms; the furniture is drawn by `seed`."""
+def building(seed: int = 0, size: tuple[float, float] = (1.0, 1.0)) -> simulate.Scene:
+    """Build the rooms, stretched along x and y by `size`; the furniture is drawn by `seed`."""
     rng = np.random.default_rng([5, seed])
+    a, b = size
     placed = [
-        _box((14, 3, -0.05), (30, 8, 0.1)),
-        _box((14, 3, HEIGHT + 0.05), (30, 8, 0.1)),
+        _box((14 * a, 3 * b, -0.05), (30 * a, 8 * b, 0.1)),
+        _box((14 * a, 3 * b, HEIGHT + 0.05), (30 * a, 8 * b, 0.1)),
         *(
-            _box(((x0 + x1) / 2, (y0 + y1) / 2, HEIGHT / 2), (x1 - x0, y1 - y0, HEIGHT))
+            _box((a * (x0 + x1) / 2, b * (y0 + y1) / 2, HEIGHT / 2), (a * (x1 - x0), b * (y1 - y0), HEIGHT))
             for x0, y0, x1, y1 in WALLS
         ),
-        *(_box((x, y, HEIGHT / 2), (rng.uniform(0.2, 0.8), 0.5, HEIGHT)) for x, y in FRAMES),
+        *(_box((a * x, b * y, HEIGHT / 2), (rng.uniform(0.2, 0.8), 0.5, HEIGHT)) for x, y in FRAMES),
     ]
     for room in (0.0, 20.0):
         for side in range(12):
             # Along the walls, so that the way is free.
-            x = room + rng.uniform(0.6, 7.4)
-            y = rng.uniform(0.3, 1.0) if side % 2 else rng.uniform(5.0, 5.7)
+            x = a * (room + rng.uniform(0.6, 7.4))
+            y = b * (rng.uniform(0.3, 1.0) if side % 2 else rng.uniform(5.0, 5.7))
             width, depth, height = rng.uniform(0.3, 1.2, 3)
             turn = simulate.turn((0.0, 0.0, 1.0), rng.uniform(0.0, np.pi))
             if side % 3 == 0:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import small_gicp
 from numpy.typing import NDArray
 
 from surfsig.clean import downsample
@@ -13,17 +13,22 @@ from surfsig.odometry.local_map import LocalMap, prepared
 from surfsig.odometry.motion import inverse, moved, orthonormal, small
 from surfsig.odometry.panorama import Panorama
 from surfsig.point_cloud import PointCloud
+from surfsig.registration.blocks import blocks, clustered_covariance
+from surfsig.registration.refinement import gicp
 
 Array = NDArray[np.float64]
+Known = Callable[[Array, Array], NDArray[np.bool_]]
 
 _MOST_STEPS = 30
-_SETTLED = 1e-4
+_SETTLED = 1e-4, 1e-4
 """Radians, and voxels: a step that is none."""
 _LAST_STEPS = 2
 _NEAR = 2.0
 """Voxels between a place and the nearest one of the map that may be the same."""
 _ON = 0.5
 """Voxels from the map's surface within which a place lies on it, at most."""
+_BESIDE = 1.2
+"""Voxels to the map's next place within which one is explained, whatever the normal there."""
 _STRAY = 3.0
 """Standard deviations from it, likewise."""
 _FLOOR = 0.02
@@ -32,10 +37,6 @@ _HELD = 5e-3
 """Mean square of the heights that the least of all motions makes, below which it is free."""
 _FEWEST = 30
 """Places that must meet the map."""
-_BLOCKS = 8.0
-"""Blocks along the scan."""
-_FEWEST_BLOCKS = 20
-"""Blocks that tell whether errors are alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +51,8 @@ class Alignment:
     """Share of the scan's places that lie on the map's surface."""
     seen_through: float
     """Share of the map's places that the sensor looked through, of those that it should have seen."""
+    unexplained: float
+    """Share of the scan's places that the map lacks, of those that earlier scans should have seen."""
     held: bool
     """Whether the surfaces hold the scan in all directions."""
     scans: NDArray[np.int64]
@@ -75,7 +78,9 @@ class Scan:
         return downsample(PointCloud(self._points), 0.5).points
 
 
-def align(scan: Scan, around: LocalMap, start: Array, reach: float) -> Alignment | None:
+def align(
+    scan: Scan, around: LocalMap, start: Array, reach: float, should_be_known: Known
+) -> Alignment | None:
     """Find a scan's pose in a map from a start nearby; None where they hardly touch.
 
     Parameters
@@ -88,28 +93,17 @@ def align(scan: Scan, around: LocalMap, start: Array, reach: float) -> Alignment
         T_map_scan, (4, 4).
     reach
         Voxels between partners, at most, to begin with.
+    should_be_known
+        Tells by a scan's pose which of its places (n, 3) earlier scans should have seen, (n,).
     """
     if len(around) < _FEWEST:
         return None
     cloud, tree, normals = around.prepared()
     pose = start
-    # One thread: several would add up in an order of their own.
     for distance in (reach, min(reach, _NEAR)):
-        found = small_gicp.align(
-            cloud,
-            scan.cloud,
-            tree,
-            init_T_target_source=pose,
-            registration_type="GICP",
-            max_correspondence_distance=distance,
-            num_threads=1,
-            max_iterations=_MOST_STEPS,
-            rotation_epsilon=_SETTLED,
-            translation_epsilon=_SETTLED,
-        )
-        if found.num_inliers < _FEWEST:
+        pose, partners = gicp(cloud, scan.cloud, tree, pose, distance, _MOST_STEPS, _SETTLED)
+        if partners < _FEWEST:
             return None
-        pose = np.array(found.T_target_source)
     for step in range(_LAST_STEPS + 1):
         places = moved(pose, scan.points)
         numbers, squares = tree.batch_nearest_neighbor_search(places)
@@ -126,11 +120,15 @@ def align(scan: Scan, around: LocalMap, start: Array, reach: float) -> Alignment
         if step < _LAST_STEPS:
             change = -np.linalg.lstsq(design.T @ design, design.T @ heights[on], rcond=1e-9)[0]
             pose = orthonormal(pose @ small(change))
+    # Not all that the map has is on its surface, by noise and at edges.
+    explained = (near & (np.abs(heights) < _ON)) | (np.asarray(squares) < _BESIDE**2)
+    known = should_be_known(pose, scan.points)
     return Alignment(
         pose,
         _covariance(design, heights[on], scan.points[on]),
         float(on.mean()),
         scan.panorama.seen_through(moved(inverse(pose), around.points)),
+        float((known & ~explained).sum() / max(1, known.sum())),
         _is_held(design),
         around.scans[nearest[on]],
     )
@@ -143,17 +141,6 @@ def _is_held(design: Array) -> bool:
 
 
 def _covariance(design: Array, heights: Array, points: Array) -> Array:
-    """Give the motion's covariance, (6, 6): neighbouring places err alike, so whole blocks of them count.
-
-    Cluster-robust: the heights' part in the motion is summed over each block, and only these sums are
-    independent.
-    """
-    size = float(np.ptp(points, axis=0).max()) / _BLOCKS
-    _, block = np.unique(np.floor(points / size).astype(np.int64), axis=0, return_inverse=True)
-    if int(block.max()) < _FEWEST_BLOCKS:
-        block = np.arange(len(points))
-    gradients = np.zeros((int(block.max()) + 1, 6))
-    np.add.at(gradients, block.ravel(), design * heights[:, None])
-    inverse = np.linalg.pinv(design.T @ design, rcond=1e-12, hermitian=True)
-    spread = gradients.T @ gradients * (len(gradients) / (len(gradients) - 6))
-    return np.asarray(inverse @ spread @ inverse)
+    """Give the motion's covariance, (6, 6): whole blocks count, or places where these are few."""
+    block = blocks(points)
+    return clustered_covariance(design, heights, np.arange(len(points)) if block is None else block)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from surfsig.field import FieldSignatures, keypoints, match_fields
 from surfsig.odometry.alignment import Alignment, Scan, align
 from surfsig.odometry.local_map import LocalMap
 from surfsig.odometry.motion import inverse, moved, turned_by
+from surfsig.odometry.panorama import Panorama
 from surfsig.point_cloud import PointCloud
 from surfsig.registration.consensus import Pairs, agreed_pose
 
@@ -26,6 +28,8 @@ _TRIED = 3
 """Poses that are tried on the map, those first that most matches agree with."""
 _AGREE = 24
 """Matches that agree with a pose that is tried, at least."""
+_WITNESSES = 4
+"""Keyframes next to a pose that say what they should have seen."""
 _REACH = 4.0
 """Voxels between partners: so far off may a pose be that matches propose."""
 
@@ -41,6 +45,7 @@ class Keyframe:
     """Its places."""
     detail: NDArray[np.float32]
     """More of them, for the signatures."""
+    panorama: Panorama
     fields: FieldSignatures | None = None
 
 
@@ -60,7 +65,7 @@ class Keyframes:
             if near and turned_by(between) < _TURNED:
                 return
         points, detail = scan.points.astype(np.float32), scan.detail().astype(np.float32)
-        self._kept.append(Keyframe(number, pose, points, detail))
+        self._kept.append(Keyframe(number, pose, points, detail, scan.panorama))
 
     def submap(self, center: Array, distance: float) -> LocalMap:
         """Make a map of the keyframes that were taken within a distance of a place."""
@@ -71,8 +76,24 @@ class Keyframes:
         result.keep_within(center, distance)
         return result
 
+    def should_know(self, pose: Array, points: Array) -> NDArray[np.bool_]:
+        """Tell which places of a scan the keyframes next to it must have seen, if they were there then.
+
+        Parameters
+        ----------
+        pose
+            T_map_scan, (4, 4).
+        points
+            The places, (n, 3).
+        """
+        near = sorted(self._kept, key=lambda other: float(np.linalg.norm(other.pose[:3, 3] - pose[:3, 3])))
+        known = np.zeros(len(points), bool)
+        for keyframe in near[:_WITNESSES]:
+            known |= keyframe.panorama.covers(moved(inverse(keyframe.pose) @ pose, points))
+        return known
+
     def find(
-        self, scan: Scan, distance: float, most_seen_through: float
+        self, scan: Scan, distance: float, is_believed: Callable[[Alignment], bool]
     ) -> tuple[Alignment, LocalMap] | None:
         """Find where a scan was taken, by its signatures; None where nothing fits.
 
@@ -82,8 +103,8 @@ class Keyframes:
             The scan.
         distance
             From the sensor to the farthest places of a map.
-        most_seen_through
-            Share of the map's places that the scan may have looked through.
+        is_believed
+            Whether a pose lies well enough.
 
         Returns
         -------
@@ -103,8 +124,8 @@ class Keyframes:
         best: tuple[Alignment, LocalMap] | None = None
         for _, pose in proposals[:_TRIED]:
             around = self.submap(pose[:3, 3], distance)
-            found = align(scan, around, pose, _REACH)
-            if found is None or not found.held or found.seen_through > most_seen_through:
+            found = align(scan, around, pose, _REACH, self.should_know)
+            if found is None or not is_believed(found):
                 continue
             if best is None or found.overlap > best[0].overlap:
                 best = found, around

@@ -39,12 +39,21 @@ class Panorama:
         places
             On surfaces, in the scan's axes, (n, 3).
         """
+        through, met = self._judged(places)
+        return float(through.sum() / max(1, (through | met).sum()))
+
+    def covers(self, places: Array) -> NDArray[np.bool_]:
+        """Tell which places (n, 3), in the scan's axes, it must have seen if they were there, (n,)."""
+        through, met = self._judged(places)
+        return through | met
+
+    def _judged(self, places: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Tell which places were looked through, and which are about where a surface was met."""
         pixels, distances = _seen(places)
         margin = _MARGIN + _MARGIN_PART * distances
         measured = self._measured[pixels]
         through = measured & (distances < self._front[pixels] - margin)
-        met = measured & ~through & (distances < self._back[pixels] + margin)
-        return float(through.sum() / max(1, through.sum() + met.sum()))
+        return through, measured & ~through & (distances < self._back[pixels] + margin)
 
 
 def _shape() -> tuple[int, int]:

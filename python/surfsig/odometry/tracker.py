@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +13,7 @@ from surfsig.odometry.keyframes import Keyframes
 from surfsig.odometry.local_map import LocalMap
 from surfsig.odometry.motion import adjoint, inverse, moved, turned_by
 from surfsig.odometry.result import ScanStatus
+from surfsig.odometry.usual import Usual
 
 Array = NDArray[np.float64]
 
@@ -27,23 +27,21 @@ _STILL = 0.1
 """Voxels: a deviation below it says nothing about motion."""
 _MOST, _BEYOND = 99.0, 1.2
 """Percent of a scan's places that the map must hold, and how much farther it goes."""
-_DROP = 0.85
-"""Of the usual overlap: below, a pose is doubted, and one that was searched not believed."""
 _LEAST = 0.4
 """Overlap of a pose that is believed, at least; as much more than another's must be to take its place."""
 _BETTER = 0.1
-_THROUGH = 0.01
-"""Share of the map's places that a scan may look through, more than scans usually do: what moved since."""
-_USUAL = 10
-"""Scans that say what overlap is usual."""
+_PROBATION = 3
+"""Scans that must follow each other through a part of the map, before the first alone is not sure."""
 _MAPPED_MOVE, _MAPPED_TURN = 1.0, 0.03
 """Voxels and radians since the last scan that went into the map."""
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What became of a scan: T_map_scan and its covariance (NaN where lost)."""
+    """What became of a scan: T_map_scan and its covariance."""
 
+    number: int
+    """Of the scan, from 0."""
     pose: Array
     covariance: Array
     status: ScanStatus
@@ -68,8 +66,10 @@ class Tracker:
         """Scans since the last one that has a pose."""
         self._squares, self._predictions = (_START * reach) ** 2, 1
         """Sum of the squared deviations of predictions, and their number."""
-        self._overlaps: deque[float] = deque(maxlen=_USUAL)
-        self._seen_through: deque[float] = deque(maxlen=_USUAL)
+        self._usual = Usual()
+        self._is_lost = False
+        self._trial: list[Step] = []
+        """Scans whose way through a part of the map must prove right."""
         self._last_mapped: Array | None = None
         self._number = 0
 
@@ -78,35 +78,39 @@ class Tracker:
         self._number += 1
         self._since += 1
 
-    def follow(self, scan: Scan) -> Step:
-        """Find the pose of the next scan."""
+    def follow(self, scan: Scan) -> list[Step]:
+        """Find the pose of the next scan; none if it is lost, and more where it proves those before right."""
         farthest = float(np.percentile(np.linalg.norm(scan.points, axis=1), _MOST))
         self._range = self._fixed_range or max(self._range, _BEYOND * farthest)
         if not self._mapped:
-            return self._took(scan, np.eye(4), np.zeros((6, 6)), ScanStatus.TRACKED, 1.0)
+            first = Step(self._number, np.eye(4), np.zeros((6, 6)), ScanStatus.TRACKED, 1.0)
+            return self._took(scan, first)
         prediction = self._last @ np.linalg.matrix_power(self._motion, self._since)
-        found = align(scan, self._map, prediction, self._partner_distance())
+        found = self._aligned(scan, prediction)
         status = ScanStatus.TRACKED
-        if self._is_doubtful(found):
-            again = self._keyframes.find(scan, self._range, self._most_seen_through())
-            if again is not None and self._is_believed(again[0], found):
+        if found is None or not self._usual.fits(found):
+            self._trial.clear()
+            again = self._keyframes.find(scan, self._range, self._usual.fits)
+            if again is not None and self._is_better(again[0], found):
                 found, self._map = again
                 status = ScanStatus.RELOCALISED
-            elif found is not None and self._deviation(prediction, found) > self._partner_distance():
-                # Neither where it was expected nor as it should lie.
+            elif found is not None and not self._is_expected(found, prediction):
                 found = None
         if found is None or not found.held or found.overlap < _LEAST:
             self.skip()
             # Where the sensor went meanwhile, nobody knows.
-            self._motion = np.eye(4)
-            return Step(np.full((4, 4), np.nan), np.full((6, 6), np.nan), ScanStatus.LOST, 0.0)
-        if status == ScanStatus.TRACKED:
+            self._motion, self._is_lost = np.eye(4), True
+            return []
+        step = Step(self._number, found.pose, self._covariance(found), status, found.overlap)
+        was_expected = status == ScanStatus.TRACKED and not self._is_lost
+        if self._is_on_trial(step, found):
+            return []
+        if was_expected:
             deviation = self._deviation(prediction, found)
             if deviation > _STILL:
                 self._squares, self._predictions = self._squares + deviation**2, self._predictions + 1
-        self._overlaps.append(found.overlap)
-        self._seen_through.append(found.seen_through)
-        return self._took(scan, found.pose, self._covariance(found), status, found.overlap)
+        self._usual.add(found)
+        return self._took(scan, step)
 
     def _partner_distance(self) -> float:
         """Let partners be as far as predictions were wrong (as in KISS-ICP, Vizzo and others 2023)."""
@@ -116,27 +120,46 @@ class Tracker:
         return max(_NARROWEST, _SIGMAS * math.sqrt(variance * self._since))
 
     def _deviation(self, prediction: Array, found: Alignment) -> float:
-        """Tell by how much a prediction was wrong, at the median distance."""
-        off = inverse(prediction) @ found.pose
+        """Tell by how much a prediction was wrong."""
+        return self._at_reach(inverse(prediction) @ found.pose)
+
+    def _at_reach(self, off: Array) -> float:
+        """Give how far a motion carries what is at the median distance, at most."""
         turned = 2.0 * self._reach * math.sin(0.5 * turned_by(off))
         return turned + float(np.linalg.norm(off[:3, 3]))
 
-    def _is_doubtful(self, found: Alignment | None) -> bool:
-        if found is None or not found.held or found.overlap < _DROP * self._usual():
+    def _aligned(self, scan: Scan, prediction: Array) -> Alignment | None:
+        known = self._keyframes.should_know
+        return align(scan, self._map, prediction, self._partner_distance(), known)
+
+    def _is_better(self, again: Alignment, found: Alignment | None) -> bool:
+        """Tell whether a pose that was searched takes the place of the doubted one."""
+        if found is None or not found.held:
             return True
-        return found.seen_through > self._most_seen_through()
+        if self._at_reach(inverse(found.pose) @ again.pose) <= _NARROWEST:
+            return False
+        return again.overlap > found.overlap + _BETTER or self._usual.is_contradicted(found)
 
-    def _most_seen_through(self) -> float:
-        usual = float(np.median(self._seen_through)) if self._seen_through else 0.0
-        return usual + _THROUGH
+    def _is_expected(self, found: Alignment, prediction: Array) -> bool:
+        """Tell whether a doubted pose may be kept: it is near where the sensor was bound for.
 
-    def _is_believed(self, again: Alignment, found: Alignment | None) -> bool:
-        """Tell whether a pose that was searched may take the place of the one that was expected."""
-        usual = again.overlap >= _DROP * self._usual()
-        return usual and (found is None or again.overlap > found.overlap + _BETTER)
+        A new room, or something that moves, explains the doubt; after scans were lost nothing is expected.
+        """
+        near = self._deviation(prediction, found) <= self._partner_distance()
+        return near and not self._is_lost and self._usual.is_hidden(found)
 
-    def _usual(self) -> float:
-        return float(np.median(self._overlaps)) if self._overlaps else _LEAST
+    def _is_on_trial(self, step: Step, found: Alignment) -> bool:
+        """Keep back the way into a known part of the map, until it is sure or has gone on for some scans.
+
+        Places that look alike from one place differ a little farther on.
+        """
+        if step.status == ScanStatus.TRACKED and not self._is_lost:
+            return False
+        self._trial.append(step)
+        self._is_lost = not self._usual.is_sure(found) and len(self._trial) < _PROBATION
+        if self._is_lost:
+            self._go_on(step)
+        return self._is_lost
 
     def _covariance(self, found: Alignment) -> Array:
         """Add the error of the map, which is that of the scans that it was made of."""
@@ -148,21 +171,29 @@ class Tracker:
             result += share * (carried @ covariance @ carried.T)
         return result
 
-    def _took(self, scan: Scan, pose: Array, covariance: Array, status: ScanStatus, overlap: float) -> Step:
-        """Go on from a pose."""
-        if status == ScanStatus.RELOCALISED:
-            self._motion, self._last_mapped = np.eye(4), None
-        elif self._since == 1:
-            self._motion = inverse(self._last) @ pose
+    def _took(self, scan: Scan, step: Step) -> list[Step]:
+        """Put a scan into the map, and give its step with those that were kept back."""
+        steps, self._trial = self._trial or [step], []
+        if steps[0].status == ScanStatus.RELOCALISED:
+            self._last_mapped = None
+        pose = step.pose
         if self._is_new(pose):
             self._map.add(moved(pose, scan.points), self._number)
             self._map.keep_within(pose[:3, 3], self._range)
-            self._mapped[self._number] = pose, covariance
+            self._mapped[self._number] = pose, step.covariance
             self._keyframes.offer(scan, pose, self._number)
             self._last_mapped = pose
-        self._last, self._since = pose, 1
+        self._go_on(step)
+        return steps
+
+    def _go_on(self, step: Step) -> None:
+        """Expect the next scan from here, with the motion since the last one."""
+        if step.status == ScanStatus.RELOCALISED:
+            self._motion = np.eye(4)
+        elif self._since == 1:
+            self._motion = inverse(self._last) @ step.pose
+        self._last, self._since = step.pose, 1
         self._number += 1
-        return Step(pose, covariance, status, overlap)
 
     def _is_new(self, pose: Array) -> bool:
         """Tell whether the sensor went on since the last scan of the map."""

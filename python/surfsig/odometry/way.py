@@ -15,6 +15,8 @@ from surfsig.odometry.tracker import Step, Tracker
 from surfsig.point_cloud import PointCloud
 
 Array = NDArray[np.float64]
+Placed = tuple[Array, Array, ScanStatus, float]
+"""Pose, covariance, status and overlap of a scan."""
 
 _FAR = 30.0
 """Of a scan's median distance from its median: a sensor is not so far."""
@@ -29,7 +31,11 @@ class Way:
         self._voxel, self._distance, self._map_range, self._threads = voxel, distance, map_range, threads
         self._scale: Scale | None = None
         self._middle: Array | None = None
-        self._steps: list[tuple[float, Array, Array, ScanStatus, float]] = []
+        self._first = 0
+        """The first scan that has a pose."""
+        self._timestamps: list[float] = []
+        self._sensors: list[Array] = []
+        self._steps: list[Placed] = []
 
     def __len__(self) -> int:
         """Return the number of scans so far."""
@@ -37,38 +43,40 @@ class Way:
 
     def add(self, scan: TimedScan) -> None:
         """Find the pose of the next scan."""
-        step, sensor = self._step(scan.cloud)
-        if step is None:
-            nothing = np.full((4, 4), np.nan), np.full((6, 6), np.nan)
-            self._steps.append((scan.timestamp, *nothing, ScanStatus.TOO_FEW_POINTS, 0.0))
+        points, sensor = self._about_sensor(scan.cloud)
+        self._timestamps.append(scan.timestamp)
+        self._sensors.append(sensor)
+        nothing = np.full((4, 4), np.nan), np.full((6, 6), np.nan)
+        self._steps.append((*nothing, ScanStatus.TOO_FEW_POINTS, 0.0))
+        usable = len(points) >= FEWEST and bool(np.ptp(points, axis=0).any())
+        if usable and self._scale is None:
+            self._begin(points)
+        if self._scale is None:
             return
-        assert self._scale is not None
-        # From places about the sensor, in voxels, to the scan's own frame and the world's.
-        size = self._scale.voxel
+        places = Scan(points / self._scale.voxel, self._threads) if usable else None
+        if places is None or len(places) < FEWEST:
+            self._tracker.skip()
+            return
+        self._steps[-1] = (*nothing, ScanStatus.LOST, 0.0)
+        for step in self._tracker.follow(places):
+            number = self._first + step.number
+            self._steps[number] = self._in_frames(step, self._sensors[number], self._scale.voxel)
+
+    def _in_frames(self, step: Step, sensor: Array, voxel: float) -> Placed:
+        """Take a step from places about the sensor, in voxels, to the scan's own frame and the world's."""
         pose = step.pose.copy()
-        pose[:3, 3] = size * pose[:3, 3] + self._first_sensor - pose[:3, :3] @ sensor
+        pose[:3, 3] = voxel * pose[:3, 3] + self._sensors[self._first] - pose[:3, :3] @ sensor
         to_sensor = np.eye(4)
         to_sensor[:3, 3] = sensor
-        carried = adjoint(to_sensor) * np.repeat([1.0, size], 3)
-        covariance = carried @ step.covariance @ carried.T
-        self._steps.append((scan.timestamp, pose, covariance, step.status, step.overlap))
+        carried = adjoint(to_sensor) * np.repeat([1.0, voxel], 3)
+        return pose, carried @ step.covariance @ carried.T, step.status, step.overlap
 
-    def _step(self, cloud: PointCloud) -> tuple[Step | None, Array]:
-        """Follow a scan's points about its sensor, and say where that is; None where they are too few."""
+    def _about_sensor(self, cloud: PointCloud) -> tuple[Array, Array]:
+        """Give a scan's points about its sensor, (n, 3), and where that is."""
         offsets = cloud.offsets.astype(np.float64)
         known = offsets[(np.abs(offsets) < COORDINATE_LIMIT).all(axis=1)]
         sensor = self._sensor(cloud.viewpoint, known, cloud.origin)
-        points = known + (cloud.origin - sensor)
-        if len(points) >= FEWEST and np.ptp(points, axis=0).any():
-            if self._scale is None:
-                self._begin(points, sensor)
-            assert self._scale is not None
-            places = Scan(points / self._scale.voxel, self._threads)
-            if len(places) >= FEWEST:
-                return self._tracker.follow(places), sensor
-        if self._scale is not None:
-            self._tracker.skip()
-        return None, sensor
+        return known + (cloud.origin - sensor), sensor
 
     def _sensor(self, viewpoint: Array | None, points: Array, origin: Array) -> Array:
         """Say where the sensor is in its scan's frame.
@@ -85,10 +93,10 @@ class Way:
             self._middle = middle + origin if far else np.zeros(3)
         return np.zeros(3) if self._middle is None else self._middle
 
-    def _begin(self, points: Array, sensor: Array) -> None:
+    def _begin(self, points: Array) -> None:
         """Take the lengths from the first scan."""
         scale = Scale.of(points, self._voxel)
-        self._scale, self._first_sensor = scale, sensor
+        self._scale, self._first = scale, len(self._steps) - 1
         self._tracker = Tracker(
             scale.reach / scale.voxel,
             scale.patch / scale.voxel,
@@ -99,12 +107,12 @@ class Way:
 
     def result(self) -> Odometry:
         """Give the way so far."""
-        timestamps, poses, covariances, status, overlaps = zip(*self._steps, strict=True)
+        poses, covariances, status, overlaps = zip(*self._steps, strict=True)
         return Odometry(
             poses=np.array(poses),
             covariances=np.array(covariances),
             status=np.array(status, np.uint8),
             overlaps=np.array(overlaps),
-            timestamps=np.array(timestamps, np.float64),
+            timestamps=np.array(self._timestamps, np.float64),
             voxel=np.nan if self._scale is None else self._scale.voxel,
         )
