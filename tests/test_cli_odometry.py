@@ -75,3 +75,36 @@ def test_mistakes_are_one_line_and_write_nothing(
     assert told in done.err
     assert done.err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_scans_that_are_cut_off_do_not_stop_the_rest(folder: Path, tmp_path: Path, shell: Shell) -> None:
+    for file in folder.glob("*.ply"):
+        whole = file.read_bytes()
+        (tmp_path / file.name).write_bytes(whole[: len(whole) // 2] if file.name == "9.5.ply" else whole)
+    output = tmp_path / "way.tum"
+    done = shell("odometry", tmp_path, "-o", output)
+    assert done.code == 0
+    assert "9.5.ply" in done.err
+    assert done.err.count("\n") == 1
+    assert surfsig.read_trajectory(output).timestamps.tolist() == [8.5, 9, 10, 10.5]
+
+
+def test_one_scan_is_a_trajectory(folder: Path, tmp_path: Path, shell: Shell) -> None:
+    output = tmp_path / "way.txt"
+    assert shell("odometry", folder / "8.5.ply", "-o", output).code == 0
+    assert output.read_text() == "1.0 0.0 0.0 0.0 0.0 1.0 0.0 0.0 0.0 0.0 1.0 0.0\n"
+
+
+def test_ctrl_c_leaves_the_old_file(
+    folder: Path, tmp_path: Path, shell: Shell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    output = tmp_path / "way.txt"
+    output.write_text("old")
+
+    def stopped(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("surfsig.odometry", stopped)
+    assert shell("odometry", folder, "-o", output).code == 130
+    assert output.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [output]

@@ -115,6 +115,39 @@ def test_names_that_are_numbers_are_timestamps(tmp_path: Path) -> None:
     assert timestamps(equal) == [0.0, 1.0]
 
 
+def test_whole_numbers_of_micro_and_milliseconds_were_taken_for_nanoseconds(tmp_path: Path) -> None:
+    """Oxford's RobotCar names scans in microseconds: 16 digits."""
+    for digits, names in (
+        (16, ["1403636579763555.ply", "1403636579863555.ply"]),
+        (13, ["1403636579763.ply", "1403636579863.ply"]),
+    ):
+        folder = tmp_path / str(digits)
+        folder.mkdir()
+        write_scans(folder, names)
+        first, second = timestamps(folder)
+        assert first == pytest.approx(1403636579.763555, abs=1e-3)
+        assert second - first == pytest.approx(0.1, abs=1e-5)
+
+
+def test_poses_and_times_beside_the_scans_were_taken_for_scans(tmp_path: Path) -> None:
+    write_scans(tmp_path, ["0.ply", "1.ply"])
+    (tmp_path / "times.txt").write_text("0.0\n0.1\n")
+    with pytest.warns(UserWarning, match=r"1 files that are not '\.ply' are left out"):
+        sequence = surfsig.scan_sequence(tmp_path)
+    assert [len(scan.cloud) for scan in sequence] == [3, 3]
+
+
+def test_a_file_that_vanishes_ended_the_whole_way(tmp_path: Path) -> None:
+    write_scans(tmp_path, ["1.ply", "2.ply", "3.ply"])
+    sequence = surfsig.scan_sequence(tmp_path)
+    (tmp_path / "2.ply").unlink()
+    with pytest.warns(
+        UserWarning, match=r"2\.ply: No such file or directory; taken as a scan without points"
+    ):
+        clouds = [scan.cloud for scan in sequence]
+    assert [len(cloud) for cloud in clouds] == [3, 0, 3]
+
+
 def test_a_broken_file_is_a_scan_without_points(tmp_path: Path) -> None:
     write_scans(tmp_path, ["1.ply", "3.ply"])
     (tmp_path / "2.ply").write_bytes(b"")
@@ -198,6 +231,29 @@ def test_a_damaged_bag_is_refused_in_a_line(tmp_path: Path, kind: str) -> None:
             told.append(str(error))
     assert len(told) > 20
     assert all(line.startswith(str(bag)) for line in told)
+
+
+def test_lengths_that_mcap_promises_take_no_memory(tmp_path: Path) -> None:
+    """rosbags asks for what a record promises; nothing that the file does not hold is ever touched."""
+    resource = pytest.importorskip("resource")
+    bag = write_bag(tmp_path / "a", "mcap")
+    file = next(bag.glob("*.mcap"))
+    whole = file.read_bytes()
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    place = 8
+    told: list[str] = []
+    while place < len(whole) - 8:
+        size = int.from_bytes(whole[place + 1 : place + 9], "little")
+        for promised in (1 << 32, 1 << 40, 1 << 62):
+            file.write_bytes(whole[: place + 1] + promised.to_bytes(8, "little") + whole[place + 9 :])
+            try:
+                list(BagTopic(bag, None))
+            except FileFormatError as error:
+                told.append(str(error))
+        place += 9 + size
+    assert len(told) > 10
+    assert all(line.startswith(str(bag)) for line in told)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000
 
 
 def test_a_bag_that_is_broken_in_its_middle_ends_there(

@@ -6,6 +6,7 @@ import itertools
 import os
 import re
 import warnings
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +21,8 @@ from surfsig.point_cloud import PointCloud
 Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
 
 _NUMBER = re.compile(r"\d+(\.\d*)?")
-_NANOSECONDS_DIGITS = 16
-"""Digits from which on a whole number counts nanoseconds: as seconds it would lie beyond any clock's time."""
+_SECONDS_DIGITS = 10
+"""Digits of a clock's time in seconds; with 3, 6 and 9 more it counts milli-, micro- and nanoseconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +91,8 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
     paths
         A file that `surfsig.read` reads, a folder of such files, or a ROS bag (a ROS 1 file, or a ROS 2
         folder or file of it), or several of them. Files of a folder are taken in the natural order of their
-        names (2 before 10), and so are several paths; hidden files are left out.
+        names (2 before 10), and so are several paths; hidden files are left out, and those of another suffix
+        than most have.
     topic
         Of bags: which topic's clouds (sensor_msgs/PointCloud2), where there are several.
     reading
@@ -100,8 +102,8 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
     -------
     ScanSequence
         Gives a `TimedScan` each. A timestamp is that in a message's header; the number that the file's name
-        is, in seconds (a whole number of 16 digits or more counts nanoseconds), where all names are numbers
-        that grow; otherwise the scan's number.
+        is, in seconds, where all names are numbers that grow (whole ones of 13, 16 and 19 digits count
+        milli-, micro- and nanoseconds); otherwise the scan's number.
 
     Raises
     ------
@@ -111,6 +113,11 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
         If a bag cannot be opened, or a folder holds no files.
     InvalidInputError
         If there is nothing to read, or the topic does not fit.
+
+    Warns
+    -----
+    UserWarning
+        If files of a folder are left out.
     """
     given = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
     parts: list[Path | BagTopic] = []
@@ -122,11 +129,7 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
         if bag is not None:
             parts.append(BagTopic(bag, topic))
         elif path.is_dir():
-            inside = (file for file in path.iterdir() if file.is_file() and file.name[0] != ".")
-            files = sorted(inside, key=_natural)
-            if not files:
-                raise FileFormatError(f"{path}: holds no files")
-            parts += files
+            parts += _files_of(path)
         else:
             parts.append(path)
     if not parts:
@@ -140,14 +143,29 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
 
 
 def scan_or_empty(path: Path, **reading: Any) -> PointCloud:
-    """Read a scan; one that is broken gives a warning and no points, so that the others can be used."""
+    """Read a scan; one that cannot be read gives a warning and no points, so that the others can be used."""
     from surfsig.files import read
 
     try:
         return read(path, **reading)
-    except FileFormatError as error:
-        warnings.warn(f"{error}; taken as a scan without points", stacklevel=2)
+    except (FileFormatError, OSError) as error:
+        told = str(error) if isinstance(error, FileFormatError) else f"{path}: {error.strerror or error}"
+        warnings.warn(f"{told}; taken as a scan without points", stacklevel=2)
         return PointCloud(np.zeros((0, 3), np.float32))
+
+
+def _files_of(folder: Path) -> list[Path]:
+    """Give the scans of a folder: the files of the commonest kind, as poses and times may lie beside them."""
+    inside = [file for file in folder.iterdir() if file.is_file() and file.name[0] != "."]
+    if not inside:
+        raise FileFormatError(f"{folder}: holds no files")
+    kinds = Counter(file.suffix.lower() for file in inside)
+    kind = max(sorted(kinds), key=lambda suffix: kinds[suffix])
+    others = len(inside) - kinds[kind]
+    if others:
+        name = f"'{kind}'" if kind else "without a suffix"
+        warnings.warn(f"{folder}: {others} files that are not {name} are left out", stacklevel=3)
+    return sorted((file for file in inside if file.suffix.lower() == kind), key=_natural)
 
 
 def _natural(path: Path) -> list[tuple[int, int, str]]:
@@ -157,12 +175,15 @@ def _natural(path: Path) -> list[tuple[int, int, str]]:
 
 
 def _times(parts: list[Path | BagTopic]) -> list[float] | None:
-    """Give the times that all files' names are."""
-    times = []
-    for part in parts:
-        if not isinstance(part, Path) or _NUMBER.fullmatch(part.stem) is None:
-            return None
-        whole = part.stem.isdecimal() and len(part.stem.lstrip("0")) >= _NANOSECONDS_DIGITS
-        times.append(int(part.stem) / 1e9 if whole else float(part.stem))
+    """Give the times that all files' names are, in seconds."""
+    names = [part.stem for part in parts if isinstance(part, Path) and _NUMBER.fullmatch(part.stem)]
+    if len(names) < len(parts):
+        return None
+    if all(name.isdecimal() for name in names):
+        digits = len(str(max(int(name) for name in names)))
+        unit = 1000 ** max(0, round((digits - _SECONDS_DIGITS) / 3))
+        times = [int(name) / unit for name in names]
+    else:
+        times = [float(name) for name in names]
     grows = all(after > before for before, after in itertools.pairwise(times))
     return times if grows else None

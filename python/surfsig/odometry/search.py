@@ -37,8 +37,8 @@ def odometry(
 
     Each scan is put onto a map of the places around that earlier scans have seen, from where the motion so
     far lets it be expected. Where it does not lie there as well as scans usually do, it is searched among
-    scans that were kept (keyframes), by the signatures of its keypoints. Nothing needs to be set, and the
-    result is always the same.
+    scans that were kept (keyframes), by the signatures of its keypoints; what is found so counts only if the
+    scan alone is sure, or the next ones agree. Nothing needs to be set, and the result is always the same.
 
     Parameters
     ----------
@@ -110,6 +110,8 @@ def _timed(scans: Any) -> Iterator[TimedScan]:
         if isinstance(scan, TimedScan):
             yield TimedScan(float(scan.timestamp), PointCloud.of(scan.cloud))
         elif isinstance(scan, (str, os.PathLike)):
+            # A wrong name is the caller's mistake, not a broken scan.
+            Path(scan).stat()
             yield TimedScan(float(number), scan_or_empty(Path(scan)))
         else:
             yield TimedScan(float(number), PointCloud.of(scan))

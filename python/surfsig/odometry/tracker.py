@@ -30,8 +30,9 @@ _MOST, _BEYOND = 99.0, 1.2
 _LEAST = 0.4
 """Overlap of a pose that is believed, at least; as much more than another's must be to take its place."""
 _BETTER = 0.1
-_PROBATION = 3
-"""Scans that must follow each other through a part of the map, before the first alone is not sure."""
+_FOUND_AGAIN, _REAPPEARED = 3, 2
+"""Scans that must agree on the way through a known part of the map where none is sure alone: in one that was
+searched, and where the sensor was last seen."""
 _MAPPED_MOVE, _MAPPED_TURN = 1.0, 0.03
 """Voxels and radians since the last scan that went into the map."""
 
@@ -156,7 +157,9 @@ class Tracker:
         if step.status == ScanStatus.TRACKED and not self._is_lost:
             return False
         self._trial.append(step)
-        self._is_lost = not self._usual.is_sure(found) and len(self._trial) < _PROBATION
+        searched = self._trial[0].status == ScanStatus.RELOCALISED
+        enough = len(self._trial) >= (_FOUND_AGAIN if searched else _REAPPEARED)
+        self._is_lost = not enough and not self._usual.is_sure(found)
         if self._is_lost:
             self._go_on(step)
         return self._is_lost
