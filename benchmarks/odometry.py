@@ -121,8 +121,8 @@ def carry_away(seed: int, lidar: Lidar) -> NDArray[np.int64]:
         off, _ = moving_sensor.errors(found.poses, np.concatenate([true, poses]))
         off = off[len(way) :].reshape(CARRIED, STEPS)
         known = np.isfinite(off)
-        # Of another building every pose is wrong.
-        false = known if place else off > RIGHT
+        # Where other walls are, every pose is wrong; where only the furniture is new, the walls' is right.
+        false = known if place == 2 else off > RIGHT
         wrong = int(false.any(axis=1).sum())
         right = int((known.any(axis=1) & ~false.any(axis=1)).sum())
         counts[place] += (CARRIED, right, wrong, CARRIED - right - wrong)
