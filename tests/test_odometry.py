@@ -209,9 +209,10 @@ def test_a_map_that_is_empty_is_no_new_beginning(walk: Walk) -> None:
     assert result.status.tolist() == [ScanStatus.TRACKED, ScanStatus.LOST]
 
 
-def test_scans_in_coordinates_of_a_map_without_a_viewpoint(walk: Walk) -> None:
+@pytest.mark.parametrize("viewpoint", [None, np.zeros(3)], ids=["none", "a PCD's"])
+def test_scans_in_coordinates_of_a_map_without_a_true_viewpoint(walk: Walk, viewpoint: Array | None) -> None:
     origin = np.array([5e5, 5e6, 100.0])
-    scans = [PointCloud(cloud.points, origin=origin) for cloud in walk.scans[:3]]
+    scans = [PointCloud(cloud.points, origin=origin, viewpoint=viewpoint) for cloud in walk.scans[:3]]
     result = surfsig.odometry(scans)
     assert result.status.tolist() == [0, 0, 0]
     frame = np.eye(4)

@@ -31,6 +31,7 @@ class Way:
         self._voxel, self._distance, self._map_range, self._threads = voxel, distance, map_range, threads
         self._scale: Scale | None = None
         self._middle: Array | None = None
+        self._is_placed = False
         self._first = 0
         """The first scan that has a pose."""
         self._timestamps: list[float] = []
@@ -79,19 +80,19 @@ class Way:
         return known + (cloud.origin - sensor), sensor
 
     def _sensor(self, viewpoint: Array | None, points: Array, origin: Array) -> Array:
-        """Say where the sensor is in its scan's frame.
+        """Say where the sensor is in its scan's frame: at its viewpoint, or at 0.
 
-        Where nobody does, it is at 0; in the coordinates of a map, 0 is far from all points, and the middle
-        of the first scan stands for it.
+        In the coordinates of a map that is far from all points (a PCD's viewpoint is 0 where nobody set it),
+        and the middle of the first scan stands for it.
         """
-        if viewpoint is not None:
-            return viewpoint
-        if self._middle is None and len(points):
+        said = np.zeros(3) if viewpoint is None else viewpoint
+        if not self._is_placed and len(points):
             middle = np.median(points, axis=0)
             spread = float(np.median(np.linalg.norm(points - middle, axis=1)))
-            far = float(np.linalg.norm(middle + origin)) > _FAR * spread
-            self._middle = middle + origin if far else np.zeros(3)
-        return np.zeros(3) if self._middle is None else self._middle
+            away = middle + (origin - said)
+            self._middle = middle + origin if float(np.linalg.norm(away)) > _FAR * spread else None
+            self._is_placed = True
+        return said if self._middle is None else self._middle
 
     def _begin(self, points: Array) -> None:
         """Take the lengths from the first scan."""
