@@ -99,6 +99,17 @@ def test_a_building_with_the_same_walls_was_taken_for_the_mapped_one(walk: Walk)
     assert result.status.tolist() == [0] * 10 + [ScanStatus.LOST] * 3
 
 
+def test_a_fast_sensor_was_lost_for_good_after_two_scans_of_noise(walk: Walk) -> None:
+    """It is looked for where its motion brought it meanwhile, beyond the map's rim."""
+    scans, true = walk.scans[:44:4], walk.true[:44:4]
+    noise = np.random.default_rng(1).normal(0.0, 2.0, (2, 5000, 3))
+    scans[7:9] = [PointCloud(points, viewpoint=np.zeros(3)) for points in noise]
+    result = surfsig.odometry(scans)
+    assert result.status.tolist() == [0] * 7 + [ScanStatus.LOST] * 2 + [0] * 2
+    off, _ = moving_sensor.errors(result.poses, true)
+    assert np.nanmax(off) < 0.02
+
+
 def test_something_that_moves_before_the_sensor_does_not_end_the_way(walk: Walk) -> None:
     """A column 0.6 m wide crosses the room 1.5 m ahead."""
     scans = list(walk.scans[:16])
@@ -132,8 +143,9 @@ def test_what_is_usual_is_what_the_last_scans_did() -> None:
     assert usual.is_sure(lying(0.75, 0.0, 0.019))
     assert not usual.is_sure(lying(0.74))
     assert not usual.is_sure(lying(0.8, 0.0, 0.021))
-    assert usual.is_hidden(lying(0.5, 0.0, 0.22))
-    assert not usual.is_hidden(lying(0.5, 0.0, 0.24))
+    assert usual.may_be_new(lying(0.5, 0.06, 0.22))
+    assert not usual.may_be_new(lying(0.5, 0.0, 0.24))
+    assert not usual.may_be_new(lying(0.5, 0.08, 0.0))
 
 
 def test_scans_without_a_place_do_not_stop_the_rest(walk: Walk) -> None:

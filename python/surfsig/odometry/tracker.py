@@ -33,6 +33,8 @@ _BETTER = 0.1
 _FOUND_AGAIN, _REAPPEARED = 3, 2
 """Scans that must agree on the way through a known part of the map where none is sure alone: in one that was
 searched, and where the sensor was last seen."""
+_COASTING = 5
+"""Lost scans during which the sensor is looked for where its motion would have brought it."""
 _MAPPED_MOVE, _MAPPED_TURN = 1.0, 0.03
 """Voxels and radians since the last scan that went into the map."""
 
@@ -90,17 +92,20 @@ class Tracker:
         found = self._aligned(scan, prediction)
         status = ScanStatus.TRACKED
         if found is None or not self._usual.fits(found):
-            self._trial.clear()
             again = self._keyframes.find(scan, self._range, self._usual.fits)
             if again is not None and self._is_better(again[0], found):
                 found, self._map = again
                 status = ScanStatus.RELOCALISED
+                self._trial.clear()
             elif found is not None and not self._is_expected(found, prediction):
                 found = None
         if found is None or not found.held or found.overlap < _LEAST:
             self.skip()
-            # Where the sensor went meanwhile, nobody knows.
-            self._motion, self._is_lost = np.eye(4), True
+            self._trial.clear()
+            self._is_lost = True
+            if self._since > _COASTING:
+                # Where the sensor went meanwhile, nobody knows.
+                self._motion = np.eye(4)
             return []
         step = Step(self._number, found.pose, self._covariance(found), status, found.overlap)
         was_expected = status == ScanStatus.TRACKED and not self._is_lost
@@ -144,10 +149,11 @@ class Tracker:
     def _is_expected(self, found: Alignment, prediction: Array) -> bool:
         """Tell whether a doubted pose may be kept: it is near where the sensor was bound for.
 
-        A new room, or something that moves, explains the doubt; after scans were lost nothing is expected.
+        Long after the sensor was lost, nothing is expected.
         """
         near = self._deviation(prediction, found) <= self._partner_distance()
-        return near and not self._is_lost and self._usual.is_hidden(found)
+        coasting = not self._is_lost or self._since <= _COASTING
+        return near and coasting and self._usual.may_be_new(found)
 
     def _is_on_trial(self, step: Step, found: Alignment) -> bool:
         """Keep back the way into a known part of the map, until it is sure or has gone on for some scans.

@@ -22,8 +22,9 @@ _UNEXPLAINED = 0.015
 """Share of a scan's places that keyframes should have seen and the map lacks, more than the most of late."""
 _NONE = 0.02
 """Such a share that is as good as none."""
-_MOVED = 0.2
-"""More than the most of late, of a scan that lies where it was expected: something moves before it."""
+_NEW, _LEFT = 0.2, 0.05
+"""Unexplained more than the most of late, and seen through more than usual, of a scan that lies where it was
+expected: what is new before the sensor, and what has left."""
 
 
 class Usual:
@@ -46,23 +47,24 @@ class Usual:
 
     def is_contradicted(self, found: Alignment) -> bool:
         """Tell whether scan and map cannot both be, by what either sensor must have seen."""
-        return self._is_seen_through(found) or found.unexplained > self._most_unexplained() + _UNEXPLAINED
+        unexplained = found.unexplained > self._most_unexplained() + _UNEXPLAINED
+        return unexplained or found.seen_through > self._through() + _THROUGH
 
     def is_sure(self, found: Alignment) -> bool:
         """Tell whether a scan says alone that its pose is right: the map explains all of it."""
-        full = found.overlap >= _FULL * self._overlap() and not self._is_seen_through(found)
-        return found.held and full and found.unexplained <= _NONE
+        full = found.overlap >= _FULL * self._overlap() and found.unexplained <= _NONE
+        return found.held and full and not self.is_contradicted(found)
 
-    def is_hidden(self, found: Alignment) -> bool:
-        """Tell whether something that moves before the map may be all that is unusual."""
-        return found.unexplained <= self._most_unexplained() + _MOVED
+    def may_be_new(self, found: Alignment) -> bool:
+        """Tell whether a new room, or something that moves, may be all that is unusual."""
+        left = found.seen_through <= self._through() + _LEFT
+        return found.held and left and found.unexplained <= self._most_unexplained() + _NEW
 
     def _overlap(self) -> float:
         return float(np.median(self._overlaps)) if self._overlaps else _FEWEST
 
-    def _is_seen_through(self, found: Alignment) -> bool:
-        usual = float(np.median(self._seen_through)) if self._seen_through else 0.0
-        return found.seen_through > usual + _THROUGH
+    def _through(self) -> float:
+        return float(np.median(self._seen_through)) if self._seen_through else 0.0
 
     def _most_unexplained(self) -> float:
         return max(self._unexplained, default=1.0)
