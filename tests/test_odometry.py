@@ -34,9 +34,9 @@ class Walk:
 
 @pytest.fixture(scope="module")
 def walk() -> Walk:
-    """Through the first room and into the corridor: 13 m in steps of 28 cm."""
+    """Through the first room and into the corridor: 12 m in steps of 28 cm."""
     scene = moving_sensor.building()
-    true = moving_sensor.way(90)[:48]
+    true = moving_sensor.way(90)[:42]
     return Walk([moving_sensor.scan(scene, pose, seed) for seed, pose in enumerate(true)], true)
 
 
@@ -46,14 +46,14 @@ def found(walk: Walk) -> Odometry:
 
 
 def test_drift_is_below_two_thousandths_of_the_way(found: Odometry, walk: Walk) -> None:
-    assert found.counts() == {"tracked": 48, "relocalised": 0, "lost": 0, "too_few_points": 0}
+    assert found.counts() == {"tracked": 42, "relocalised": 0, "lost": 0, "too_few_points": 0}
     off, turned = moving_sensor.errors(found.poses, walk.true)
     steps = np.linalg.norm(np.diff(walk.true[:, :3, 3], axis=0), axis=1)
     assert found.length == pytest.approx(steps.sum(), rel=2e-3)
     assert off.max() < 0.002 * found.length
     assert np.degrees(turned.max()) < 0.1
     np.testing.assert_array_equal(found.poses[0], np.eye(4))
-    np.testing.assert_array_equal(found.timestamps, np.arange(48))
+    np.testing.assert_array_equal(found.timestamps, np.arange(42))
 
 
 def test_covariances_are_as_large_as_the_errors(found: Odometry, walk: Walk) -> None:
@@ -101,7 +101,7 @@ def test_a_building_with_the_same_walls_was_taken_for_the_mapped_one(walk: Walk)
 
 def test_a_fast_sensor_was_lost_for_good_after_two_scans_of_noise(walk: Walk) -> None:
     """It is looked for where its motion brought it meanwhile, beyond the map's rim."""
-    scans, true = walk.scans[:44:4], walk.true[:44:4]
+    scans, true = walk.scans[:41:4], walk.true[:41:4]
     noise = np.random.default_rng(1).normal(0.0, 2.0, (2, 5000, 3))
     scans[7:9] = [PointCloud(points, viewpoint=np.zeros(3)) for points in noise]
     result = surfsig.odometry(scans)
@@ -178,10 +178,9 @@ def test_only_empty_scans() -> None:
 
 def test_the_same_for_any_number_of_threads(walk: Walk) -> None:
     scans = [*walk.scans[:12:3], walk.scans[1]]
-    first, second, third = (surfsig.odometry(scans, threads=threads) for threads in (1, 2, 1))
-    for other in (second, third):
-        for name in ("poses", "covariances", "status", "overlaps", "voxel"):
-            np.testing.assert_array_equal(getattr(first, name), getattr(other, name))
+    first, second = (surfsig.odometry(scans, threads=threads) for threads in (1, 2))
+    for name in ("poses", "covariances", "status", "overlaps", "voxel"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
 def test_unit_and_place_of_the_frame_do_not_matter(walk: Walk) -> None:
