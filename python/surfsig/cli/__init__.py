@@ -21,6 +21,7 @@ from surfsig.cli.find import find_command
 from surfsig.cli.fit import fit_command
 from surfsig.cli.info import info_command
 from surfsig.cli.library import library_command
+from surfsig.cli.odometry import odometry_command
 from surfsig.cli.paper import paper_command
 from surfsig.cli.register import register_command
 from surfsig.cli.surfaces import surfaces_command
@@ -57,6 +58,7 @@ for command in (
     fit_command,
     surfaces_command,
     register_command,
+    odometry_command,
     find_command,
     library_command,
     compare_command,

@@ -19,9 +19,24 @@ from surfsig.files.atomic import check_target, replacing
 from surfsig.files.columns import Chunks, output_columns
 from surfsig.files.options import box_array, cropped, in_metres, metres_per
 from surfsig.files.progress import Progress, ProgressCallback
+from surfsig.files.sequence import ScanSequence, TimedScan, scan_sequence
+from surfsig.files.trajectory import Trajectory, read_trajectory, trajectory_format, write_trajectory
 from surfsig.point_cloud import PointCloud
 
-__all__ = ["Chunks", "check_writable", "format_name", "read", "write"]
+__all__ = [
+    "Chunks",
+    "ScanSequence",
+    "TimedScan",
+    "Trajectory",
+    "check_writable",
+    "format_name",
+    "read",
+    "read_trajectory",
+    "scan_sequence",
+    "trajectory_format",
+    "write",
+    "write_trajectory",
+]
 
 
 def read(

@@ -27,7 +27,7 @@ MAX_LZF_RATIO = 88
 
 _KEYS = ("VERSION", "FIELDS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
 # PCL keeps a colour in one number of any type, blue first.
-_CHANNELS = {
+PACKED_COLOURS = {
     "rgb": {"red": 2, "green": 1, "blue": 0},
     "rgba": {"red": 2, "green": 1, "blue": 0, "alpha": 3},
 }
@@ -250,8 +250,8 @@ def _places(header: Header, source: str) -> dict[str, tuple[str, int | None]]:
             continue
         if name in places:
             raise FileFormatError(f"{source}: two fields are called '{name}'")
-        if name in _CHANNELS and not shape and np.dtype(kind).itemsize == 4:
-            places |= {colour: (key, byte) for colour, byte in _CHANNELS[name].items()}
+        if name in PACKED_COLOURS and not shape and np.dtype(kind).itemsize == 4:
+            places |= {colour: (key, byte) for colour, byte in PACKED_COLOURS[name].items()}
         else:
             places[name] = (key, None)
     return places

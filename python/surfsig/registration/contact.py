@@ -10,6 +10,8 @@ from scipy.sparse import coo_array
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from surfsig.registration.blocks import blocks, clustered_covariance
+
 Array = NDArray[np.float64]
 
 _NEIGHBOURS = 20
@@ -31,10 +33,6 @@ _SMALLEST = 1e-9
 """Of the largest area, what a point stands for at least."""
 _AROUND = 10
 """Nearest points that tell the area around one."""
-_BLOCKS = 8.0
-"""Blocks along the overlap: what errs alike within one counts once."""
-_FEWEST_BLOCKS = 20
-"""Blocks that tell whether errors are alike."""
 _LARGE = 4.0
 """Medians of the variance about the surface beyond which it is more than noise."""
 
@@ -212,14 +210,9 @@ def _independent(design: Array, heights: Array, found: _Heights, on: NDArray[np.
 
 def _alike(design: Array, heights: Array, places: Array, independent: Array) -> float:
     """Say how much more the sums over blocks of neighbours vary than independent errors', 1 at least."""
-    size = float(np.ptp(places, axis=0).max()) / _BLOCKS
-    _, block = np.unique(np.floor(places / size).astype(np.int64), axis=0, return_inverse=True)
-    gradients = np.zeros((int(block.max()) + 1, 6))
-    np.add.at(gradients, block.ravel(), design * heights[:, None])
-    count = len(gradients)
-    if count <= _FEWEST_BLOCKS:
+    block = blocks(places)
+    if block is None:
         return 1.0
     information = design.T @ design
-    inverse = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
-    alike = inverse @ (gradients.T @ gradients) @ inverse * count / (count - 6)
+    alike = clustered_covariance(design, heights, block)
     return max(float(np.trace(alike @ information) / np.trace(independent @ information)), 1.0)

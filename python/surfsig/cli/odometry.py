@@ -1,0 +1,93 @@
+"""`surfsig odometry`: where the sensor was at each scan of a sequence."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from surfsig.cli.console import number, on_terminal, print_json, print_table, progress_bar
+from surfsig.cli.options import CLOUD, input_options, json_option, quiet_option, threads_option
+
+if TYPE_CHECKING:
+    from surfsig.files.trajectory import TrajectoryFormat
+
+
+@click.command("odometry", no_args_is_help=True)
+@click.argument("scans", type=CLOUD, nargs=-1, required=True)
+@click.option("-o", "--output", type=CLOUD, required=True, help="The trajectory, a text file.")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["kitti", "tum"]),
+    help="Of the output.  [default: tum for .tum, else kitti]",
+)
+@click.option("--topic", metavar="NAME", help="Of a ROS bag with several topics of point clouds, which.")
+@click.option("--voxel", type=float, help="Thin scans and map to a place per voxel.  [default: by the scans]")
+@click.option(
+    "--distance", type=float, help="To partners in the map, at most.  [default: by how well motion is known]"
+)
+@click.option("--map-range", type=float, help="Of the map about the sensor.  [default: by the scans]")
+@input_options
+@threads_option
+@json_option
+@quiet_option
+def odometry_command(
+    scans: tuple[Path, ...],
+    output: Path,
+    form: TrajectoryFormat | None,
+    topic: str | None,
+    voxel: float | None,
+    distance: float | None,
+    map_range: float | None,
+    threads: int | None,
+    as_json: bool,
+    quiet: bool,
+    **reading: Any,
+) -> None:
+    """Find the pose of each scan of a sequence: of SCANS, which are files, folders or ROS bags.
+
+    Nothing needs to be set. Scans are taken in the natural order of their names (2 before 10), or of the
+    messages. One that cannot be placed has a line of nan (KITTI) or none (TUM), and does not stop the rest.
+    TUM's timestamps are the messages', or the files' names where these are numbers.
+
+    \b
+    Examples:
+      surfsig odometry scans/* -o trajectory.txt
+      surfsig odometry scans/ -o trajectory.tum
+      surfsig odometry drive.bag --topic /points -o trajectory.tum
+    """  # noqa: D301
+    import surfsig
+    from surfsig.files import trajectory_format
+    from surfsig.files.atomic import check_target
+
+    check_target(output)
+    shown = on_terminal() and not quiet
+    given = {name: value for name, value in reading.items() if value is not None}
+    sequence = surfsig.scan_sequence(scans, topic=topic, **given)
+    with progress_bar("finding poses", "scans", shown=shown) as progress:
+        found = surfsig.odometry(
+            sequence,
+            voxel=voxel,
+            distance=distance,
+            map_range=map_range,
+            threads=threads,
+            progress=progress,
+        )
+    counts = found.counts()
+    if not counts["tracked"]:
+        raise surfsig.InvalidInputError(f"{scans[0]}: no scan has enough points to find its pose")
+    if counts["lost"]:
+        warnings.warn(f"{counts['lost']} of {len(found)} scans are lost", stacklevel=1)
+    chosen = trajectory_format(output) if form is None else form
+    surfsig.write_trajectory(output, found.poses, found.timestamps, format=chosen)
+    if as_json:
+        values = {"output": str(output), "format": chosen, "scans": len(found), **counts}
+        print_json({**values, "length": found.length, "voxel": found.voxel})
+    elif shown:
+        rows = [("scans", f"{len(found):,}")]
+        rows += [(name.replace("_", " "), f"{count:,}") for name, count in counts.items() if count]
+        rows += [("length", number(found.length)), ("voxel", number(found.voxel))]
+        print_table(f"{output}", rows, err=True)

@@ -1,0 +1,189 @@
+"""Sequences of scans: files, folders and ROS bags, read one by one."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import warnings
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from surfsig.errors import FileFormatError, InvalidInputError
+from surfsig.files.ros_bag import BagTopic, bag_of
+from surfsig.point_cloud import PointCloud
+
+Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
+
+_NUMBER = re.compile(r"\d+(\.\d*)?")
+_SECONDS_DIGITS = 10
+"""Digits of a clock's time in seconds; with 3, 6 and 9 more it counts milli-, micro- and nanoseconds."""
+
+
+@dataclass(frozen=True, eq=False)
+class TimedScan:
+    """A scan, and when it was taken.
+
+    Attributes
+    ----------
+    timestamp
+        In seconds.
+    cloud
+        The scan.
+    """
+
+    timestamp: float
+    cloud: PointCloud
+
+
+class ScanSequence:
+    """Scans that are read one by one, as often as they are walked through.
+
+    A file that cannot be read gives a warning and a scan without points; a bag that is broken in its middle
+    gives one and ends there.
+
+    Parameters
+    ----------
+    parts
+        Files, and topics of bags.
+    reading
+        What `surfsig.read` is asked for.
+    """
+
+    def __init__(self, parts: list[Path | BagTopic], reading: dict[str, Any]) -> None:
+        self._parts, self._reading = parts, reading
+        self._times = _times(parts)
+
+    def __len__(self) -> int:
+        """Return the number of scans."""
+        return sum(1 if isinstance(part, Path) else len(part) for part in self._parts)
+
+    def __iter__(self) -> Iterator[TimedScan]:
+        """Read scan by scan."""
+        number = 0
+        for part in self._parts:
+            for stamp, cloud in self._scans_of(part):
+                if self._times is not None:
+                    stamp = self._times[number]
+                yield TimedScan(float(number) if stamp is None else stamp, cloud)
+                number += 1
+
+    def _scans_of(self, part: Path | BagTopic) -> Iterator[tuple[float | None, PointCloud]]:
+        if isinstance(part, Path):
+            yield None, scan_or_empty(part, **self._reading)
+            return
+        try:
+            yield from part
+        except FileFormatError as error:
+            warnings.warn(f"{error}; its scans end there", stacklevel=2)
+
+
+def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> ScanSequence:
+    """Find the scans of a sequence, to be read one by one.
+
+    Parameters
+    ----------
+    paths
+        A file that `surfsig.read` reads, a folder of such files, or a ROS bag (a ROS 1 file, or a ROS 2
+        folder or file of it), or several of them. Files of a folder are taken in the natural order of their
+        names (2 before 10), and so are several paths; hidden files are left out, and those of another suffix
+        than most have.
+    topic
+        Of bags: which topic's clouds (sensor_msgs/PointCloud2), where there are several.
+    reading
+        Of files: further keywords, `unit`, `box`, ... as `surfsig.read` takes them.
+
+    Returns
+    -------
+    ScanSequence
+        Gives a `TimedScan` each. A timestamp is that in a message's header; the number that the file's name
+        is, in seconds, where all names are numbers that grow (whole ones of 13, 16 and 19 digits count
+        milli-, micro- and nanoseconds); otherwise the scan's number.
+
+    Raises
+    ------
+    OSError
+        If a path is missing.
+    FileFormatError
+        If a bag cannot be opened, or a folder holds no files.
+    InvalidInputError
+        If there is nothing to read, or the topic does not fit.
+
+    Warns
+    -----
+    UserWarning
+        If files of a folder are left out.
+    """
+    given = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
+    parts: list[Path | BagTopic] = []
+    chosen = sorted((Path(path) for path in given), key=_natural)
+    for path in chosen:
+        # Whatever is missing says so now, and not after hours.
+        path.stat()
+        bag = bag_of(path)
+        if bag is not None:
+            parts.append(BagTopic(bag, topic))
+        elif path.is_dir():
+            parts += _files_of(path)
+        else:
+            parts.append(path)
+    if not parts:
+        raise InvalidInputError("there are no scans")
+    bags = [part for part in parts if isinstance(part, BagTopic)]
+    if topic is not None and not bags:
+        raise InvalidInputError(f"{chosen[0]}: is no ROS bag, and so has no topic '{topic}'")
+    if reading and bags:
+        raise InvalidInputError(f"{bags[0].path}: '{next(iter(reading))}' means nothing for a ROS bag")
+    return ScanSequence(parts, reading)
+
+
+def scan_or_empty(path: Path, **reading: Any) -> PointCloud:
+    """Read a scan; one that cannot be read gives a warning and no points, so that the others can be used."""
+    from surfsig.files import read
+
+    try:
+        return read(path, **reading)
+    except (FileFormatError, OSError) as error:
+        told = str(error) if isinstance(error, FileFormatError) else f"{path}: {error.strerror or error}"
+        warnings.warn(f"{told}; taken as a scan without points", stacklevel=2)
+        return PointCloud(np.zeros((0, 3), np.float32))
+
+
+def _files_of(folder: Path) -> list[Path]:
+    """Give the scans of a folder: the files of the commonest kind, as poses and times may lie beside them."""
+    inside = [file for file in folder.iterdir() if file.is_file() and file.name[0] != "."]
+    if not inside:
+        raise FileFormatError(f"{folder}: holds no files")
+    kinds = Counter(file.suffix.lower() for file in inside)
+    kind = max(sorted(kinds), key=lambda suffix: kinds[suffix])
+    others = len(inside) - kinds[kind]
+    if others:
+        name = f"'{kind}'" if kind else "without a suffix"
+        warnings.warn(f"{folder}: {others} files that are not {name} are left out", stacklevel=3)
+    return sorted((file for file in inside if file.suffix.lower() == kind), key=_natural)
+
+
+def _natural(path: Path) -> list[tuple[int, int, str]]:
+    """Compare runs of digits as numbers; the name itself decides between 1 and 01."""
+    words = re.split(r"(\d+)", str(path))
+    return [(0, int(word), word) if word.isdecimal() else (1, 0, word) for word in words]
+
+
+def _times(parts: list[Path | BagTopic]) -> list[float] | None:
+    """Give the times that all files' names are, in seconds."""
+    names = [part.stem for part in parts if isinstance(part, Path) and _NUMBER.fullmatch(part.stem)]
+    if len(names) < len(parts):
+        return None
+    if all(name.isdecimal() for name in names):
+        digits = len(str(max(int(name) for name in names)))
+        unit = 1000 ** max(0, round((digits - _SECONDS_DIGITS) / 3))
+        times = [int(name) / unit for name in names]
+    else:
+        times = [float(name) for name in names]
+    grows = all(after > before for before, after in itertools.pairwise(times))
+    return times if grows else None

@@ -1,0 +1,73 @@
+"""What `odometry` gives."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class ScanStatus(enum.IntEnum):
+    """Why a scan has the pose that it has."""
+
+    TRACKED = 0
+    """Found next to where it was expected."""
+    RELOCALISED = 1
+    """Found by its signatures, after tracking had failed."""
+    LOST = 2
+    """Not found: no pose."""
+    TOO_FEW_POINTS = 3
+    """It has hardly any points, or cannot be read: no pose."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Odometry:
+    """The way of a sensor: one struct of arrays, with a status for each of n scans.
+
+    The world is the frame of the first scan that has a pose. NaN stands where there is none.
+    """
+
+    poses: Array
+    """T_world_scan, (n, 4, 4)."""
+    covariances: Array
+    """Of the small motion m (rotation vector in radians, then translation) in the scan's own frame by which a
+    pose is off, (n, 6, 6): T_true = T_world_scan exp(m). It grows as the map goes on from the first scan."""
+    status: NDArray[np.uint8]
+    """`ScanStatus` as a number, (n,)."""
+    overlaps: Array
+    """Share of the scan's places that lie on the map, (n,); 0 where there is no pose."""
+    timestamps: Array
+    """In seconds, (n,): from the recording, or the files' names where these are numbers; otherwise the scans'
+    numbers."""
+    voxel: float
+    """In which scans and map were thinned, in the scans' unit; NaN if no scan had enough points."""
+
+    def __len__(self) -> int:
+        """Return the number of scans."""
+        return len(self.poses)
+
+    def __repr__(self) -> str:
+        """Say how many there are, and what became of them."""
+        told = ", ".join(
+            f"{count} {name.replace('_', ' ')}" for name, count in self.counts().items() if count
+        )
+        return f"Odometry({len(self)} scans: {told or 'none'})"
+
+    def counts(self) -> dict[str, int]:
+        """Count the scans of each status.
+
+        Returns
+        -------
+        Numbers by the status's name in lower case.
+        """
+        return {status.name.lower(): int((self.status == status).sum()) for status in ScanStatus}
+
+    @property
+    def length(self) -> float:
+        """Length of the way, in the scans' unit: straight lines between the scans that have a pose."""
+        places = self.poses[np.isfinite(self.poses).all(axis=(1, 2)), :3, 3]
+        return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
