@@ -1,6 +1,6 @@
 """Whether scans are registered from any start, how long that takes, and whether wrong poses are trusted.
 
-python benchmarks/registration.py --starts 3 --write
+python benchmarks/registration.py --write
 
 Each pair in both directions, the source turned and shifted at random. Pairs that do not overlap are fragments
 of one room, each cut to a side that the other does not have.
@@ -12,6 +12,7 @@ import argparse
 import datetime
 import os
 import sys
+import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from descriptor_pairs import Array, read_pairs
 from machine import describe_machine, own_versions
-from peers import ROOT
+from peers import HERE, ROOT, PeerUnavailable, peer_python, run_json
 from report import Results, Row, markdown_table, measured_on, update_section
 from rich.progress import track
 from scipy.spatial.transform import Rotation
@@ -30,6 +31,7 @@ from surfsig import PointCloud
 COMMAND = "python benchmarks/registration.py --write"
 COLUMNS = (
     "pairs",
+    "method",
     "viewpoints",
     "right",
     "trusted of right",
@@ -38,8 +40,14 @@ COLUMNS = (
     "largest",
 )
 SEED = 3
-CUTS = 3
+PEER_SECONDS = 1800
+CUTS = 9
 """Ways in which each pair of fragments is cut apart."""
+PEER_STARTS = 2
+"""Random starts of each pair for the peers."""
+PEERS = {"open3d": "Open3D: FPFH, RANSAC, ICP", "kiss": "KISS-Matcher, GICP"}
+VOXELS = {"redkitchen": 0.05, "bunny": 0.003, "lidar": 0.5, "redkitchen, cut apart": 0.05}
+"""What the peers are told of each kind of scan; of three that were tried the best or as good as it."""
 GAP = 0.3
 """Between the parts, in standard deviations of the points along the cut."""
 
@@ -103,29 +111,69 @@ def cut_apart(pair: Pair, rng: np.random.Generator) -> Pair:
     return Pair(pair.source[ours > middle + gap / 2], pair.target[theirs < middle - gap / 2], None, 0.0, 0.0)
 
 
-def row(title: str, pairs: list[Pair], starts: int, known: bool) -> Row:
-    """Register all pairs from some starts each, and return a row of the table."""
+def starts_of(pairs: list[Pair], count: int) -> list[list[Array]]:
+    """Give random starts of each pair, (4, 4)."""
     rng = np.random.default_rng(SEED)
-    right, trusted_right, trusted_wrong, seconds = 0, 0, 0, []
-    for pair in track(pairs, description=title, transient=True):
-        for _ in range(starts):
-            start = np.eye(4)
-            start[:3, :3] = Rotation.random(random_state=int(rng.integers(1 << 30))).as_matrix()
-            start[:3, 3] = rng.normal(size=3) * np.ptp(pair.source, axis=0).max()
+    return [[_start(pair, rng) for _ in range(count)] for pair in pairs]
+
+
+def _start(pair: Pair, rng: np.random.Generator) -> Array:
+    start = np.eye(4)
+    start[:3, :3] = Rotation.random(random_state=int(rng.integers(1 << 30))).as_matrix()
+    start[:3, 3] = rng.normal(size=3) * np.ptp(pair.source, axis=0).max()
+    return start
+
+
+def ours(title: str, pairs: list[Pair], starts: int, known: bool) -> Row:
+    """Register all pairs from some starts each, and return a row of the table."""
+    poses, seconds, trusted = [], [], []
+    every = starts_of(pairs, starts)
+    for pair, each in track(list(zip(pairs, every, strict=True)), description=title, transient=True):
+        for start in each:
             moved = pair.source @ start[:3, :3].T + start[:3, 3]
             eyes = (start[:3, 3], np.zeros(3)) if known else (None, None)
             clouds = PointCloud(moved, viewpoint=eyes[0]), PointCloud(pair.target, viewpoint=eyes[1])
             begin = time.perf_counter()
             found = surfsig.register(*clouds)
             seconds.append(time.perf_counter() - begin)
-            good = is_right(found.T_target_source @ start, pair)
-            right += good
-            trusted_right += good and found.trusted
-            trusted_wrong += not good and found.trusted
-    count = len(seconds)
+            poses.append(found.T_target_source)
+            trusted.append(found.trusted)
+    return row(title, "surfsig", pairs, every, known, poses, seconds, trusted)
+
+
+def peers(title: str, pairs: list[Pair], starts: int, known: bool, method: str) -> Row:
+    """Let a peer do the same."""
+    every = starts_of(pairs, starts)
+    with tempfile.TemporaryDirectory() as folder:
+        files = []
+        for number, (pair, each) in enumerate(zip(pairs, every, strict=True)):
+            files.append(Path(folder) / f"{number}.npz")
+            np.savez(files[-1], source=pair.source, target=pair.target, starts=np.array(each), known=known)
+        program: list[str | Path] = [peer_python(), HERE / "registration_peers.py", method, *files]
+        command = [*program, "--voxel", str(VOXELS[title])]
+        answer = run_json(command, threads=os.cpu_count() or 1, seconds=PEER_SECONDS)
+    poses = [np.array(pose) for pose in answer["poses"]]
+    return row(title, PEERS[method], pairs, every, known, poses, answer["seconds"], answer["confident"])
+
+
+def row(
+    title: str,
+    method: str,
+    pairs: list[Pair],
+    starts: list[list[Array]],
+    known: bool,
+    poses: list[Array],
+    seconds: list[float],
+    trusted: list[bool],
+) -> Row:
+    """Compare the poses with the truth, pair by pair and start by start."""
+    asked = [(pair, start) for pair, each in zip(pairs, starts, strict=True) for start in each]
+    good = np.array([is_right(pose @ start, pair) for pose, (pair, start) in zip(poses, asked, strict=True)])
+    sure, count, right = np.array(trusted), len(good), int(good.sum())
     return (
-        title, "known" if known else "not known", f"{right} of {count}", f"{trusted_right} of {right}",
-        f"{trusted_wrong} of {count - right}", f"{np.median(seconds):.2f}", f"{max(seconds):.2f}",
+        title, method, "known" if known else "not known", f"{right} of {count}",
+        f"{(good & sure).sum()} of {right}", f"{(~good & sure).sum()} of {count - right}",
+        f"{np.median(seconds):.2f}", f"{max(seconds):.2f}",
     )  # fmt: skip
 
 
@@ -138,12 +186,21 @@ def is_right(pose: Array, pair: Pair) -> bool:
     return bool(turn < pair.degrees and np.linalg.norm(left[:3, 3]) < pair.distance)
 
 
+def peer_versions() -> dict[str, str]:
+    """Give those of the peers that are installed."""
+    try:
+        program: list[str | Path] = [peer_python(), HERE / "registration_peers.py", "versions"]
+        return {name: str(text) for name, text in run_json(program, threads=1).items()}
+    except PeerUnavailable:
+        return {}
+
+
 def main() -> None:
     """Measure, print and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     default = Path(os.environ.get("SURFSIG_TEST_DATA", ROOT / ".." / "shared" / "data"))
     parser.add_argument("data", type=Path, nargs="?", default=default, help="folder of the real scans")
-    parser.add_argument("--starts", type=int, default=3, help="random starts of each pair")
+    parser.add_argument("--starts", type=int, default=20, help="random starts of each pair")
     parser.add_argument("--write", action="store_true", help="update BENCHMARKS.md")
     arguments = parser.parse_args()
     sets = known_pairs(arguments.data)
@@ -152,13 +209,19 @@ def main() -> None:
     results: Results = {
         "machine": describe_machine(),
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
-        "versions": own_versions(),
+        "versions": own_versions() | peer_versions(),
     }
-    table = [
-        row(title, pairs, arguments.starts if pairs[0].truth is not None else 1, known)
-        for title, pairs in sets.items()
-        for known in (True, False)
-    ]
+    table: list[Row] = []
+    for title, pairs in sets.items():
+        overlap = pairs[0].truth is not None
+        table.append(ours(title, pairs, arguments.starts if overlap else 1, True))
+        # Where nobody knows the viewpoints, nothing changes for the peers but the sign of normals.
+        table.append(ours(title, pairs, PEER_STARTS if overlap else 1, False))
+        for method in PEERS:
+            try:
+                table.append(peers(title, pairs, PEER_STARTS if overlap else 1, True, method))
+            except PeerUnavailable as error:
+                print(f"{PEERS[method]}, {title}: {error}", file=sys.stderr)
     notes = "\n".join(f"- {line}" for line in [*measured_on(results), f"The seed is {SEED}."])
     text = f"{markdown_table(COLUMNS, table)}\n\n{notes}"
     print(text)
