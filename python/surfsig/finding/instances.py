@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -58,7 +59,12 @@ class Instance:
         )
 
     def values(self) -> dict[str, Any]:
-        """Give everything as plain numbers, lists and dictionaries; of the points their number."""
+        """Give everything as plain numbers, lists and dictionaries; of the points their number.
+
+        Returns
+        -------
+        By the names of the attributes; matrices row by row.
+        """
         return {
             "name": self.name,
             "T_scene_model": self.T_scene_model.tolist(),
@@ -78,6 +84,7 @@ class Instances:
     """All instances in a scene, the best first; a sequence of `Instance`."""
 
     instances: list[Instance]
+    """The best first."""
     cloud: PointCloud
     """The scene."""
     models: dict[str, PointCloud]
@@ -89,6 +96,9 @@ class Instances:
 
     def __getitem__(self, number: int) -> Instance:
         return self.instances[number]
+
+    def __iter__(self) -> Iterator[Instance]:
+        return iter(self.instances)
 
     def __repr__(self) -> str:
         lines = (f"  {number}: {instance!r}" for number, instance in enumerate(self.instances))
@@ -103,7 +113,12 @@ class Instances:
         return labels
 
     def summary(self) -> str:
-        """Say in words how many there are: "5 instances (3 of cup, 2 of plate)", or "not there"."""
+        """Say in words how many there are.
+
+        Returns
+        -------
+        As "5 instances (3 of cup, 2 of plate)", or "not there".
+        """
         if not self.instances:
             return "not there"
         counts = Counter(instance.name for instance in self.instances)
@@ -195,7 +210,12 @@ class Instances:
         return header, rows
 
     def values(self) -> dict[str, Any]:
-        """Give all as plain numbers, lists and dictionaries, for JSON: summary, and instances."""
+        """Give all as plain numbers, lists and dictionaries, for JSON.
+
+        Returns
+        -------
+        "summary", and "instances", each as `Instance.values` with its number.
+        """
         return {
             "summary": self.summary(),
             "instances": [{"number": n, **instance.values()} for n, instance in enumerate(self.instances)],

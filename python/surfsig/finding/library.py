@@ -136,6 +136,11 @@ class Library:
     def list(self) -> list[LibraryEntry]:
         """Tell what is in it, by name.
 
+        Returns
+        -------
+        list of LibraryEntry
+            Empty where the file does not exist.
+
         Raises
         ------
         FileFormatError
@@ -148,11 +153,21 @@ class Library:
             return [LibraryEntry(*row) for row in rows]
 
     def names(self) -> tuple[str, ...]:
-        """Give the models' names, sorted."""
+        """Give the models' names.
+
+        Returns
+        -------
+        Sorted.
+        """
         return tuple(entry.name for entry in self.list())
 
     def remove(self, name: str) -> None:
         """Take a model out.
+
+        Parameters
+        ----------
+        name
+            The model's.
 
         Raises
         ------
@@ -166,7 +181,17 @@ class Library:
                 raise self._missing(name)
 
     def get(self, name: str) -> PointCloud:
-        """Give a model's points, in the coordinates that it was added in.
+        """Give a model's points.
+
+        Parameters
+        ----------
+        name
+            The model's.
+
+        Returns
+        -------
+        PointCloud
+            The finite ones, in the coordinates that they were added in.
 
         Raises
         ------
@@ -179,7 +204,24 @@ class Library:
         return PointCloud(model.points, origin=model.middle)
 
     def model(self, name: str) -> Model:
-        """Give a model as it is looked for."""
+        """Give a model as `find` looks for it: places, normals and signatures.
+
+        Parameters
+        ----------
+        name
+            The model's.
+
+        Returns
+        -------
+        Model
+
+        Raises
+        ------
+        InvalidInputError
+            If there is none of this name.
+        FileFormatError
+            If the file is damaged.
+        """
         rows: list[tuple[Any, ...]] = []
         if self.path.exists():
             with self._opened() as store:
