@@ -11,6 +11,7 @@ import json
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
@@ -68,7 +69,7 @@ def main(folder: Path, picture: Path) -> None:
         drawn.convert("RGB").quantize(64, dither=Image.Dither.NONE).save(picture, optimize=True)
 
 
-def draw(ax: Axes, parts: list[tuple[NDArray[np.float64], tuple[float, ...]]], title: str) -> None:
+def draw(ax: Axes, parts: Sequence[tuple[NDArray[np.float64], tuple[float, ...]]], title: str) -> None:
     """Draw clouds in colours as the camera saw them, far points darker, the nearest in front."""
     step = max(1, sum(len(points) for points, _ in parts) // DRAWN)
     thinned = [points[:: step if len(points) > DRAWN else 1] for points, _ in parts]

@@ -132,6 +132,18 @@ def test_a_closed_surface_is_not_seen_from_one_place() -> None:
     assert seen_from(eye, ball[ball[:, 2] > 0.1], 0.02)
 
 
+def test_points_a_million_metres_away_change_nothing() -> None:
+    scene, far = finding_scene("figure", 2, copies=1, others=1), [[1e6, -2e6, 1e6]]
+    model = surfsig.PointCloud(np.concatenate([whole("figure").points, far]))
+    points = np.concatenate([scene.cloud.points, far])
+    found = surfsig.find(model, surfsig.PointCloud(points, viewpoint=scene.cloud.viewpoint))
+    assert len(found) == 1
+    # That the points are there is seen in the last digits only.
+    (near,) = surfsig.find(whole("figure"), scene.cloud).instances
+    np.testing.assert_allclose(found[0].T_scene_model, near.T_scene_model, atol=1e-6)
+    assert len(points) - 1 not in found[0].indices
+
+
 @pytest.mark.parametrize("score", [0.0, 1.5, np.nan, "much"])
 def test_a_score_without_meaning_is_said(score: float) -> None:
     with pytest.raises(surfsig.InvalidInputError, match="score must be"):

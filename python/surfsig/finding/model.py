@@ -71,8 +71,8 @@ class Model:
 
     @property
     def extent(self) -> float:
-        """Largest distance of a point from `middle`."""
-        return float(np.linalg.norm(self.points, axis=1).max())
+        """Largest distance of its surface from `middle`; stray points have none."""
+        return float(np.linalg.norm(self.places, axis=1).max())
 
     def with_radius(self, radius: float, threads: int | None) -> Model:
         """Give the model with patches of another radius."""
