@@ -35,7 +35,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_files_in_any_order_become_a_kitti_file(folder: Path, tmp_path: Path, shell: Shell) -> None:
     output = tmp_path / "way.txt"
     # As a shell sorts them: 10.0, 10.5, 11.0, 8.5, ...
-    done = shell("odometry", *sorted(folder.glob("*.ply")), "-o", output, "--json")
+    errors = tmp_path / "covariances.txt"
+    scans = sorted(folder.glob("*.ply"))
+    done = shell("odometry", *scans, "-o", output, "--covariances", errors, "--json")
     assert done.code == 0
     values = json.loads(done.out)
     assert values.pop("length") == pytest.approx(LENGTH, rel=0.01)
@@ -46,6 +48,7 @@ def test_files_in_any_order_become_a_kitti_file(folder: Path, tmp_path: Path, sh
     }  # fmt: skip
     expected = surfsig.odometry(folder)
     np.testing.assert_array_equal(surfsig.read_trajectory(output).poses, expected.poses)
+    np.testing.assert_array_equal(np.loadtxt(errors).reshape(-1, 6, 6), expected.covariances)
 
 
 def test_the_name_or_the_option_says_tum(folder: Path, tmp_path: Path, shell: Shell) -> None:

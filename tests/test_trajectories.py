@@ -89,3 +89,8 @@ def test_what_is_no_trajectory_is_refused(tmp_path: Path, text: str, told: str) 
     with pytest.raises(FileFormatError, match=told) as caught:
         surfsig.read_trajectory(file)
     assert str(caught.value).startswith(str(file))
+
+
+def test_covariances_without_6_rows_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(surfsig.InvalidInputError, match=r"shape \(n, 6, 6\), not \(2, 3, 3\)"):
+        surfsig.write_covariances(tmp_path / "file.txt", np.zeros((2, 3, 3)))

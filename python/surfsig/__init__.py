@@ -27,6 +27,7 @@ from surfsig.files import (
     read_trajectory,
     scan_sequence,
     write,
+    write_covariances,
     write_trajectory,
 )
 from surfsig.finding import Instance, Instances, Library, LibraryEntry, find
@@ -93,5 +94,6 @@ __all__ = [
     "similarity_matrix",
     "surfaces",
     "write",
+    "write_covariances",
     "write_trajectory",
 ]

@@ -24,6 +24,12 @@ if TYPE_CHECKING:
     type=click.Choice(["kitti", "tum"]),
     help="Of the output.  [default: tum for .tum, else kitti]",
 )
+@click.option(
+    "--covariances",
+    type=CLOUD,
+    metavar="FILE",
+    help="Write each pose's covariance: 36 numbers a line, for rotation and translation in the scan's frame.",
+)
 @click.option("--topic", metavar="NAME", help="Of a ROS bag with several topics of point clouds, which.")
 @click.option("--voxel", type=float, help="Thin scans and map to a place per voxel.  [default: by the scans]")
 @click.option(
@@ -38,6 +44,7 @@ def odometry_command(
     scans: tuple[Path, ...],
     output: Path,
     form: TrajectoryFormat | None,
+    covariances: Path | None,
     topic: str | None,
     voxel: float | None,
     distance: float | None,
@@ -63,7 +70,9 @@ def odometry_command(
     from surfsig.files import trajectory_format
     from surfsig.files.atomic import check_target
 
-    check_target(output)
+    for target in (output, covariances):
+        if target is not None:
+            check_target(target)
     shown = on_terminal() and not quiet
     given = {name: value for name, value in reading.items() if value is not None}
     sequence = surfsig.scan_sequence(scans, topic=topic, **given)
@@ -83,6 +92,8 @@ def odometry_command(
         warnings.warn(f"{counts['lost']} of {len(found)} scans are lost", stacklevel=1)
     chosen = trajectory_format(output) if form is None else form
     surfsig.write_trajectory(output, found.poses, found.timestamps, format=chosen)
+    if covariances is not None:
+        surfsig.write_covariances(covariances, found.covariances)
     if as_json:
         values = {"output": str(output), "format": chosen, "scans": len(found), **counts}
         print_json({**values, "length": found.length, "voxel": found.voxel})

@@ -20,7 +20,13 @@ from surfsig.files.columns import Chunks, output_columns
 from surfsig.files.options import box_array, cropped, in_metres, metres_per
 from surfsig.files.progress import Progress, ProgressCallback
 from surfsig.files.sequence import ScanSequence, TimedScan, scan_sequence
-from surfsig.files.trajectory import Trajectory, read_trajectory, trajectory_format, write_trajectory
+from surfsig.files.trajectory import (
+    Trajectory,
+    read_trajectory,
+    trajectory_format,
+    write_covariances,
+    write_trajectory,
+)
 from surfsig.point_cloud import PointCloud
 
 __all__ = [
@@ -35,6 +41,7 @@ __all__ = [
     "scan_sequence",
     "trajectory_format",
     "write",
+    "write_covariances",
     "write_trajectory",
 ]
 

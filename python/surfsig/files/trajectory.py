@@ -95,6 +95,33 @@ def write_trajectory(
         kept = matrices[known]
         turns = Rotation.from_matrix(kept[:, :3, :3]).as_quat() if len(kept) else np.zeros((0, 4))
         rows = np.column_stack([times[known], kept[:, :3, 3], turns])
+    _write_rows(path, rows)
+
+
+def write_covariances(path: str | os.PathLike[str], covariances: ArrayLike) -> None:
+    """Write covariances as text, 36 numbers a line, row by row; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path
+        The file.
+    covariances
+        (n, 6, 6), as `Odometry.covariances`; NaN where there is none.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    InvalidInputError
+        If the shape is another.
+    """
+    matrices = np.asarray(covariances, np.float64)
+    if matrices.ndim != 3 or matrices.shape[1:] != (6, 6):
+        raise InvalidInputError(f"covariances must have the shape (n, 6, 6), not {matrices.shape}")
+    _write_rows(path, matrices.reshape(-1, 36))
+
+
+def _write_rows(path: str | os.PathLike[str], rows: NDArray[np.float64]) -> None:
     with replacing(Path(path)) as file:
         file.writelines(" ".join(map(repr, row)).encode() + b"\n" for row in rows.tolist())
 
