@@ -10,7 +10,7 @@ PREFIX ?= /usr/local
 # What the compiled module is made from; a change of any rebuilds it.
 SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -name '*.bin' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help demo test lint format bench bench-reading bench-error bench-segmentation fuzz docs tour wheel check-wheel header install-c clean build
+.PHONY: help demo test lint format bench bench-reading bench-error bench-segmentation bench-registration bench-finding bench-odometry fuzz docs tour wheel check-wheel header install-c clean build
 .DEFAULT_GOAL := help
 
 help: ## Say what there is to make
@@ -46,8 +46,18 @@ bench-reading: build ## Time the reading of files, and write that table of BENCH
 
 bench-error: build ## Measure the error of curvature beside CGAL's jets, and write BENCHMARKS.md and docs/fits.md
 	$(BIN)/python benchmarks/curvature_error.py --write
+
 bench-segmentation: build ## Score the surfaces found in clouds of known ones, and write that part of BENCHMARKS.md
 	$(BIN)/python benchmarks/segmentation.py --write
+
+bench-registration: build ## Register pairs of scans beside the peers, and write that part of BENCHMARKS.md
+	$(BIN)/python benchmarks/registration.py --write
+
+bench-finding: build ## Look for objects in simulated and real scenes, and write that part of BENCHMARKS.md
+	$(BIN)/python benchmarks/finding.py --write
+
+bench-odometry: build ## Follow sensors through a simulated building, and write that part of BENCHMARKS.md
+	$(BIN)/python benchmarks/odometry.py --write
 
 fuzz: build ## Read damaged files of all formats: make fuzz COUNT=100000
 	$(BIN)/python fuzz/mutate.py --count $(COUNT)
