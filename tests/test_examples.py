@@ -94,6 +94,16 @@ def test_surfaces(shared_data: Path, tmp_path: Path) -> None:
     assert picture.stat().st_size > 30_000
 
 
+def test_find_again(shared_data: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("small_gicp")
+    picture = tmp_path / "again.png"
+    lines = run(EXAMPLES / "find_again.py", shared_data, picture)
+    assert any(re.match(r"trusted +yes", line) for line in lines)
+    assert any(line.endswith("scene.pcd: 1 instance (1 of chef)") for line in lines)
+    assert picture.stat().st_size > 50_000
+
+
 def test_real_classes(shared_data: Path, tmp_path: Path) -> None:
     """The table of docs/zeta.md: right decisions, in percent, without a flat atom and with either length."""
     pytest.importorskip("matplotlib")
