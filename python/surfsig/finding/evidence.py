@@ -26,6 +26,8 @@ _SIGHTS = 100
 _CONTRADICTED, _MISSING = 5.0, 1.0
 """What a place that the sensor saw through, and one where it saw nothing, count in confirmed ones: of true
 poses hardly any place is seen through, but sensors miss dark and shiny ones."""
+_FREE_SPACE_UNKNOWN = 0.6
+"""What a confirmed place counts where nobody knows what the sensor saw through: clutter reaches more there."""
 _ROUND = 0.1
 """Spread of confirmed normals (1 less the largest eigenvalue of their second moments) from which on they are
 more than a plane, which anything has."""
@@ -89,6 +91,8 @@ class Witness:
             facing = np.array([self.facing(pose).mean() for pose in poses])
             seen = confirmed / np.maximum(facing, np.maximum(confirmed, 1e-9))
         scores = (confirmed - wrong) / self.most_seen
+        if self.eye is None:
+            scores *= _FREE_SPACE_UNKNOWN
         for number, (pose, touching) in enumerate(zip(poses, touched, strict=True)):
             if scores[number] <= 0.0:
                 continue

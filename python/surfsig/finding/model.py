@@ -107,6 +107,8 @@ def model_of(data: PointCloud | ArrayLike, radius: float | None = None, threads:
     if size == 0.0:
         raise InvalidInputError("a model's points must not all be at one place")
     normals, sided = sides_of(local, size, threads)
+    # What goes all around has its volume inside.
+    sided |= float(np.linalg.norm(normals.mean(axis=0))) < _CLOSED
     return described(points, middle, size, spacing, normals, sided, threads)
 
 
@@ -140,7 +142,10 @@ def surface_places(
 
 
 def sides_of(cloud: PointCloud, radius: float, threads: int | None) -> tuple[Array, bool]:
-    """Give normals (n, 3) on the surface's outer side, and whether the cloud says which that is."""
+    """Give normals (n, 3) on one side of each piece of surface, and whether the cloud says which that is.
+
+    Where it does not, all are turned so that most face away from the middle.
+    """
     viewpoint, directions = orientation(cloud, None, None, np.arange(len(cloud)))
     if directions is not None:
         return directions.astype(np.float64), True
@@ -150,5 +155,4 @@ def sides_of(cloud: PointCloud, radius: float, threads: int | None) -> tuple[Arr
     normals = one_sided_normals(unknown, radius / _SIDE_VOXELS, threads)
     # The sign that makes the volume within positive.
     outwards = np.einsum("ij,ij->i", cloud.points - cloud.points.mean(axis=0), normals).sum()
-    closed = float(np.linalg.norm(normals.mean(axis=0))) < _CLOSED
-    return (normals if outwards >= 0.0 else -normals), closed
+    return (normals if outwards >= 0.0 else -normals), False
