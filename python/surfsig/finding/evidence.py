@@ -27,7 +27,7 @@ _CONTRADICTED, _MISSING = 5.0, 1.0
 """What a place that the sensor saw through, and one where it saw nothing, count in confirmed ones: of true
 poses hardly any place is seen through, but sensors miss dark and shiny ones."""
 _FREE_SPACE_UNKNOWN = 0.6
-"""What a confirmed place counts where nobody knows what the sensor saw through: clutter reaches more there."""
+"""What a confirmed place counts where nobody knows what the sensor saw through, and clutter reaches more."""
 _ROUND = 0.1
 """Spread of confirmed normals (1 less the largest eigenvalue of their second moments) from which on they are
 more than a plane, which anything has."""
