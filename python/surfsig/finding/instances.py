@@ -37,7 +37,8 @@ class Instance:
     center: Array
     """Middle of what touches the scene's points, (3,), in the scene's coordinates."""
     score: float
-    """What of the model is confirmed, less what is wrong, over the most of it that can be seen at once."""
+    """What of the model is confirmed, less what is wrong, over the most of it that can be seen at once; 0.6
+    of that where the sensor's place is not known."""
     visible: float
     """Share of the surface facing the sensor that is seen, 0 to 1; of all of it where the sensor's place is
     not known."""
