@@ -29,7 +29,7 @@ _TABLE = """
 CREATE TABLE models (
     name TEXT PRIMARY KEY, added TEXT NOT NULL, unit TEXT, points INTEGER NOT NULL, radius REAL NOT NULL,
     spacing REAL NOT NULL, sided INTEGER NOT NULL, size INTEGER NOT NULL, arrays BLOB NOT NULL
-) STRICT
+)
 """
 _SIGNATURES = ("points", "vectors", "axes", "tangents", "phases", "count", "status")
 _LARGEST = 1 << 32

@@ -19,6 +19,7 @@ from surfsig.finding.model import FEWEST, SPACINGS, Model, model_of
 from surfsig.finding.proposals import proposed_poses
 from surfsig.finding.scene import Scene
 from surfsig.point_cloud import PointCloud
+from surfsig.recurrences.alignment import inverse
 from surfsig.recurrences.free_directions import free_directions
 from surfsig.registration.contact import Surface, contact, spread
 from surfsig.registration.motion import shifted
@@ -212,11 +213,11 @@ def _instance(candidate: _Candidate, scene: Scene, taken: NDArray[np.bool_]) -> 
     near = candidate.near(scene.points)
     moved = spread(scene.points[near & ~taken], _MOST_FITTED, scene.threads)
     fitted = contact(
-        moved, Surface(model.points, around.voxel, scene.threads), _inverse(candidate.pose), around.voxel
+        moved, Surface(model.points, around.voxel, scene.threads), inverse(candidate.pose), around.voxel
     )
     if fitted is None:
         return None
-    pose = _inverse(fitted.pose)
+    pose = inverse(fitted.pose)
     better = replace(candidate, pose=pose)
     evidence = _weighed(better)
     for part in scene.parts():
@@ -240,7 +241,3 @@ def _instance(candidate: _Candidate, scene: Scene, taken: NDArray[np.bool_]) -> 
         ),
         indices=scene.numbers[own],
     )
-
-
-def _inverse(pose: Array) -> Array:
-    return np.asarray(np.linalg.inv(pose))

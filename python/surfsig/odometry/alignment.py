@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from surfsig.clean import downsample
 from surfsig.odometry.local_map import LocalMap, prepared
-from surfsig.odometry.motion import inverse, moved, orthonormal, small
+from surfsig.odometry.motion import moved, orthonormal, small
 from surfsig.odometry.panorama import Panorama
 from surfsig.point_cloud import PointCloud
+from surfsig.recurrences.alignment import inverse
 from surfsig.registration.blocks import blocks, clustered_covariance
 from surfsig.registration.refinement import gicp
 

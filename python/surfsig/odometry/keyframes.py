@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from surfsig.field import FieldSignatures, keypoints, match_fields
 from surfsig.odometry.alignment import Alignment, Scan, align
 from surfsig.odometry.local_map import LocalMap
-from surfsig.odometry.motion import inverse, moved, turned_by
+from surfsig.odometry.motion import moved, turned_by
 from surfsig.odometry.panorama import Panorama
 from surfsig.point_cloud import PointCloud
+from surfsig.recurrences.alignment import inverse
 from surfsig.registration.consensus import Pairs, agreed_pose
 
 Array = NDArray[np.float64]

@@ -9,14 +9,6 @@ from scipy.spatial.transform import Rotation
 Array = NDArray[np.float64]
 
 
-def inverse(pose: Array) -> Array:
-    """Give T_b_a of T_a_b, (4, 4)."""
-    result = np.eye(4)
-    result[:3, :3] = pose[:3, :3].T
-    result[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-    return result
-
-
 def moved(pose: Array, points: Array) -> Array:
     """Move points, (n, 3)."""
     return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])

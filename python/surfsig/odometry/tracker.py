@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from surfsig.odometry.alignment import Alignment, Scan, align
 from surfsig.odometry.keyframes import Keyframes
 from surfsig.odometry.local_map import LocalMap
-from surfsig.odometry.motion import adjoint, inverse, moved, turned_by
+from surfsig.odometry.motion import adjoint, moved, turned_by
 from surfsig.odometry.result import ScanStatus
 from surfsig.odometry.usual import Usual
+from surfsig.recurrences.alignment import inverse
 
 Array = NDArray[np.float64]
 
