@@ -8,14 +8,13 @@ All in one process, in turns; the medians are reported, and the ranges of the ra
 from __future__ import annotations
 
 import argparse
-import datetime
 from collections.abc import Callable
 
 import numpy as np
 from clouds import SCALING_POINTS, bumpy_square, bumpy_tenth
-from machine import ROOT, describe_machine, own_versions
+from machine import measured_here
 from numpy.typing import NDArray
-from report import TARGET_POINTS, TARGET_RADIUS, Row, markdown_table, measured_on, update_section
+from report import TARGET_POINTS, TARGET_RADIUS, Row, markdown_table, measured_on, publish
 from timing import times_of
 
 import surfsig
@@ -33,11 +32,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help="update BENCHMARKS.md")
     arguments = parser.parse_args()
-    facts = {
-        "machine": describe_machine(),
-        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
-        "versions": own_versions(),
-    }
+    facts = measured_here()
     sparse = bumpy_square(TARGET_POINTS)
     clouds = (sparse, bumpy_square(SCALING_POINTS), bumpy_tenth(SCALING_POINTS))
     parts = [
@@ -48,9 +43,7 @@ def main() -> None:
         "\n".join(f"- {note}" for note in measured_on(facts)),
     ]
     text = "\n\n".join(parts)
-    print(text)
-    if arguments.write:
-        update_section(ROOT / "BENCHMARKS.md", "python benchmarks/density.py --write", text)
+    publish(text, "python benchmarks/density.py --write", arguments.write)
 
 
 def one_radius(cloud: NDArray[np.float32]) -> Job:

@@ -10,7 +10,6 @@ surfsig's normals, and several radii.
 from __future__ import annotations
 
 import argparse
-import datetime
 import os
 import sys
 import tempfile
@@ -21,10 +20,10 @@ from pathlib import Path
 import numpy as np
 from descriptor_objects import read_objects, simulated_objects
 from descriptor_pairs import Array, Scan, ScanPairs, read_pairs
-from machine import describe_machine, own_versions
+from machine import measured_here
 from numpy.typing import NDArray
 from peers import HERE, ROOT, PeerUnavailable, peer_python, run_json, shot_program
-from report import Results, Row, markdown_table, measured_on, update_section
+from report import Results, Row, markdown_table, measured_on, publish
 from timing import times_of
 
 import surfsig
@@ -189,11 +188,7 @@ def main() -> None:
     every = read_pairs(arguments.data)
     if not every:
         sys.exit(f"{arguments.data} has no registration/redkitchen or registration/bunny")
-    results: Results = {
-        "machine": describe_machine(),
-        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
-        "versions": own_versions(),
-    }
+    results: Results = measured_here()
     for peer, command in (
         ("Open3D", lambda: [peer_python("open3d"), HERE / "descriptors_open3d.py"]),
         ("PCL", shot_program),
@@ -213,12 +208,7 @@ def main() -> None:
         parts.append(markdown_table(SPEED_COLUMNS, speed_rows(every, Path(name))))
     parts.append("\n".join(f"- {line}" for line in measured_on(results)))
     text = "\n\n".join(parts)
-    print(text)
-    if arguments.write:
-        try:
-            update_section(ROOT / "BENCHMARKS.md", COMMAND, text)
-        except (OSError, ValueError) as error:
-            sys.exit(f"BENCHMARKS.md is not updated: {error}")
+    publish(text, COMMAND, arguments.write)
 
 
 if __name__ == "__main__":

@@ -6,9 +6,7 @@ python benchmarks/finding.py --write
 from __future__ import annotations
 
 import argparse
-import datetime
 import os
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,10 +14,10 @@ from pathlib import Path
 import numpy as np
 from descriptor_pairs import read_pairs
 from finding_scene import NOISE, OBJECTS, FindingScene, finding_scene, whole
-from machine import describe_machine, own_versions
+from machine import measured_here
 from numpy.typing import NDArray
 from peers import ROOT
-from report import Results, Row, markdown_table, measured_on, update_section
+from report import Results, Row, markdown_table, measured_on, publish
 from rich.progress import track
 
 import surfsig
@@ -156,11 +154,7 @@ def main() -> None:
     parser.add_argument("--noise", type=float, nargs="+", default=[NOISE, 5 * NOISE], help="metres")
     parser.add_argument("--write", action="store_true", help="update BENCHMARKS.md")
     arguments = parser.parse_args()
-    results: Results = {
-        "machine": describe_machine(),
-        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
-        "versions": own_versions(),
-    }
+    results: Results = measured_here()
     rows = [
         simulated_row(name, noise, arguments.seeds) for name in arguments.objects for noise in arguments.noise
     ]
@@ -169,12 +163,7 @@ def main() -> None:
         parts.append(markdown_table(REAL, real_rows(arguments.data)))
     notes = [*measured_on(results), f"Seeds of the scenes: {', '.join(map(str, arguments.seeds))}."]
     text = "\n\n".join([*parts, "\n".join(f"- {line}" for line in notes)])
-    print(text)
-    if arguments.write:
-        try:
-            update_section(ROOT / "BENCHMARKS.md", COMMAND, text)
-        except (OSError, ValueError) as error:
-            sys.exit(f"BENCHMARKS.md is not updated: {error}")
+    publish(text, COMMAND, arguments.write)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import os
 import platform
 import re
@@ -51,6 +52,15 @@ def idle_seconds() -> float | None:
     """Return how long the cores have been idle since the system started, added up (Linux)."""
     uptime = Path("/proc/uptime")
     return float(uptime.read_text().split()[1]) if uptime.exists() else None
+
+
+def measured_here(others: dict[str, str] | None = None) -> dict[str, Any]:
+    """Tell on what machine, when, and with which versions, the peers' `others` among them."""
+    return {
+        "machine": describe_machine(),
+        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
+        "versions": own_versions() | (others or {}),
+    }
 
 
 def own_versions() -> dict[str, str]:

@@ -9,15 +9,14 @@ building with the same walls and other furniture, and to one with other walls.
 from __future__ import annotations
 
 import argparse
-import datetime
 import time
 
 import moving_sensor
 import numpy as np
-from machine import ROOT, describe_machine, own_versions
+from machine import measured_here
 from moving_sensor import Array, Lidar
 from numpy.typing import NDArray
-from report import Row, markdown_table, measured_on, update_section
+from report import Row, markdown_table, measured_on, publish
 from rich.progress import track
 
 import surfsig
@@ -52,11 +51,7 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="update BENCHMARKS.md")
     parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS, help="buildings of the second table")
     arguments = parser.parse_args()
-    facts = {
-        "machine": describe_machine(),
-        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
-        "versions": own_versions(),
-    }
+    facts = measured_here()
     ways = [follow(name, *sensor) for name, sensor in track(SENSORS.items(), "following")]
     back: list[Row] = []
     for sensor in BACK_SENSORS:
@@ -70,9 +65,7 @@ def main() -> None:
         "\n".join(f"- {note}" for note in measured_on(facts)),
     ]
     text = "\n\n".join(parts)
-    print(text)
-    if arguments.write:
-        update_section(ROOT / "BENCHMARKS.md", "python benchmarks/odometry.py --write", text)
+    publish(text, "python benchmarks/odometry.py --write", arguments.write)
 
 
 def follow(name: str, lidar: Lidar, count: int) -> Row:

@@ -9,7 +9,6 @@ of one room, each cut to a side that the other does not have.
 from __future__ import annotations
 
 import argparse
-import datetime
 import os
 import sys
 import tempfile
@@ -19,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 from descriptor_pairs import Array, read_pairs
-from machine import describe_machine, own_versions
+from machine import measured_here
 from peers import HERE, ROOT, PeerUnavailable, peer_python, run_json
-from report import Results, Row, markdown_table, measured_on, update_section
+from report import Results, Row, markdown_table, measured_on, publish
 from rich.progress import track
 from scipy.spatial.transform import Rotation
 
@@ -206,11 +205,7 @@ def main() -> None:
     sets = known_pairs(arguments.data)
     if not sets:
         sys.exit(f"{arguments.data} has no folder registration")
-    results: Results = {
-        "machine": describe_machine(),
-        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
-        "versions": own_versions() | peer_versions(),
-    }
+    results: Results = measured_here(peer_versions())
     table: list[Row] = []
     for title, pairs in sets.items():
         overlap = pairs[0].truth is not None
@@ -224,12 +219,7 @@ def main() -> None:
                 print(f"{PEERS[method]}, {title}: {error}", file=sys.stderr)
     notes = "\n".join(f"- {line}" for line in [*measured_on(results), f"The seed is {SEED}."])
     text = f"{markdown_table(COLUMNS, table)}\n\n{notes}"
-    print(text)
-    if arguments.write:
-        try:
-            update_section(ROOT / "BENCHMARKS.md", COMMAND, text)
-        except (OSError, ValueError) as error:
-            sys.exit(f"BENCHMARKS.md is not updated: {error}")
+    publish(text, COMMAND, arguments.write)
 
 
 if __name__ == "__main__":

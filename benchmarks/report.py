@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import statistics
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from peers import PEERS
+from peers import PEERS, ROOT
 from rich.console import Console
 from rich.table import Table
 
@@ -240,6 +241,17 @@ def markdown_table(columns: Sequence[str], rows: Iterable[Row]) -> str:
     """Return one table as Markdown."""
     lines = [columns, ["---"] * len(columns), *rows]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+def publish(text: str, command: str, write: bool) -> None:
+    """Print what a benchmark found, and put it into the command's section of BENCHMARKS.md."""
+    print(text)
+    if not write:
+        return
+    try:
+        update_section(ROOT / "BENCHMARKS.md", command, text)
+    except (OSError, ValueError) as error:
+        sys.exit(f"BENCHMARKS.md is not updated: {error}")
 
 
 def update_section(document: Path, command: str, text: str) -> None:
