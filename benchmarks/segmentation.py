@@ -6,7 +6,6 @@ The truth is that of Fit4CAD (planes, cylinders, cones, tori and spheres) and of
 from __future__ import annotations
 
 import argparse
-import datetime
 import json
 import os
 import sys
@@ -14,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from machine import describe_machine, own_versions
+from machine import measured_here
 from peers import BUILD, HERE, ROOT, Command, PeerUnavailable, run_json
 from report import Results, Row, markdown_table, measured_on, update_section
 from rich.console import Console
@@ -60,9 +59,7 @@ def measure(plan: argparse.Namespace, console: Console) -> Results:
         sys.exit(f"{plan.data} has no cloud that is asked for: of Fit4CAD, or in labelled_tables")
     methods = [method for method in METHODS if method.name in plan.methods]
     results: Results = {
-        "machine": describe_machine(),
-        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
-        "versions": own_versions() | peer_versions(plan.methods),
+        **measured_here(peer_versions(plan.methods)),
         "seed": SEED,
         "clouds": len(models),
         "models": {},

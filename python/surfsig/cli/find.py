@@ -9,7 +9,14 @@ import click
 
 from surfsig import defaults
 from surfsig.cli.console import on_terminal, print_columns, print_json, progress_bar, write_json
-from surfsig.cli.options import CLOUD, input_options, quiet_option, threads_option
+from surfsig.cli.options import (
+    CLOUD,
+    check_results,
+    input_options,
+    quiet_option,
+    result_options,
+    threads_option,
+)
 
 
 @click.command("find", no_args_is_help=True)
@@ -17,17 +24,7 @@ from surfsig.cli.options import CLOUD, input_options, quiet_option, threads_opti
 @click.option(
     "--library", type=CLOUD, metavar="FILE", help="Look for all models of a library; then no MODEL."
 )
-@click.option("-o", "--output", type=CLOUD, help="A .ply, .pcd, .las, .laz, .e57, .npz or .parquet file.")
-@click.option(
-    "--json",
-    "json_file",
-    type=CLOUD,
-    metavar="FILE|-",
-    help="Write poses, covariances and scores as JSON; - is stdout.",
-)
-@click.option(
-    "--report", type=CLOUD, metavar="FILE.html", help="Write a page with the scene, before and after."
-)
+@result_options("poses, covariances and scores", "the scene, before and after")
 @click.option(
     "--score",
     type=float,
@@ -63,19 +60,12 @@ def find_command(
       surfsig find --library things.db scene.pcd
     """  # noqa: D301
     import surfsig
-    from surfsig.files import check_writable
-    from surfsig.files.atomic import check_target
 
     if len(files) != (2 if library is None else 1):
         wanted = "MODEL and SCENE" if library is None else "SCENE alone, beside --library"
         raise click.UsageError(f"give {wanted}")
     scene_file = files[-1]
-    on_stdout = json_file is not None and str(json_file) == "-"
-    if output is not None:
-        check_writable(output)
-    for target in (report, None if on_stdout else json_file):
-        if target is not None:
-            check_target(target)
+    on_stdout = check_results(output, json_file, report)
     model: surfsig.Library | dict[str, surfsig.PointCloud]
     if library is None:
         model = {files[0].stem: surfsig.read(files[0], **reading)}

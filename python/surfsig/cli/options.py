@@ -137,3 +137,40 @@ def quiet_option(command: Function) -> Function:
 def json_option(command: Function) -> Function:
     """Add --json."""
     return click.option("--json", "as_json", is_flag=True, help="Print one JSON object to stdout.")(command)
+
+
+def result_options(values: str, page: str) -> Callable[[Function], Function]:
+    """Add -o, --json and --report; the words say what is written."""
+    formats = "A .ply, .pcd, .las, .laz, .e57, .npz or .parquet file."
+    options = [
+        click.option("-o", "--output", type=CLOUD, help=formats),
+        click.option(
+            "--json",
+            "json_file",
+            type=CLOUD,
+            metavar="FILE|-",
+            help=f"Write {values} as JSON; - is stdout.",
+        ),
+        click.option("--report", type=CLOUD, metavar="FILE.html", help=f"Write a page with {page}."),
+    ]
+
+    def added(command: Function) -> Function:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return added
+
+
+def check_results(output: Path | None, json_file: Path | None, report: Path | None) -> bool:
+    """Refuse what cannot be written before there is work; tell whether JSON goes to stdout."""
+    from surfsig.files import check_writable
+    from surfsig.files.atomic import check_target
+
+    on_stdout = json_file is not None and str(json_file) == "-"
+    if output is not None:
+        check_writable(output)
+    for target in (report, None if on_stdout else json_file):
+        if target is not None:
+            check_target(target)
+    return on_stdout

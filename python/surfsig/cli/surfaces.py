@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from surfsig.cli.console import on_terminal, print_columns, print_json, progress_bar, write_json
-from surfsig.cli.options import CLOUD, input_options, quiet_option, threads_option, words
+from surfsig.cli.options import (
+    CLOUD,
+    check_results,
+    input_options,
+    quiet_option,
+    result_options,
+    threads_option,
+    words,
+)
 
 if TYPE_CHECKING:
     from surfsig import Recurrences, Surfaces
@@ -17,17 +25,7 @@ if TYPE_CHECKING:
 
 @click.command("surfaces", no_args_is_help=True)
 @click.argument("file", type=CLOUD)
-@click.option("-o", "--output", type=CLOUD, help="A .ply, .pcd, .las, .laz, .e57, .npz or .parquet file.")
-@click.option(
-    "--json",
-    "json_file",
-    type=CLOUD,
-    metavar="FILE|-",
-    help="Write the surfaces with all errors as JSON; - is stdout.",
-)
-@click.option(
-    "--report", type=CLOUD, metavar="FILE.html", help="Write a page with a view that turns, and the table."
-)
+@result_options("the surfaces with all errors", "a view that turns, and the table")
 @click.option(
     "--min-points",
     type=int,
@@ -79,15 +77,8 @@ def surfaces_command(
       surfsig surfaces part.ply --unit mm --kinds plane,cylinder --json - | jq '.surfaces[].radius'
     """  # noqa: D301
     import surfsig
-    from surfsig.files import check_writable
-    from surfsig.files.atomic import check_target
 
-    on_stdout = json_file is not None and str(json_file) == "-"
-    if output is not None:
-        check_writable(output)
-    for target in (report, None if on_stdout else json_file):
-        if target is not None:
-            check_target(target)
+    on_stdout = check_results(output, json_file, report)
     shown = on_terminal() and not quiet
     with progress_bar("reading", "bytes", shown=shown) as progress:
         cloud = surfsig.read(file, progress=progress, **reading)
