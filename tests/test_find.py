@@ -9,7 +9,7 @@ from finding_scene import FindingScene, finding_scene, whole
 from scipy.spatial.transform import Rotation
 
 import surfsig
-from surfsig.finding.visible_from import seen_from
+from surfsig.visibility import seen_from
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,9 @@ from surfsig.recurrences.free_directions import free_directions, free_directions
 from surfsig.recurrences.grouping import groups_of, ways_from_first
 from surfsig.recurrences.main_surface import may_be_equal
 from surfsig.recurrences.matching import common_share
-from surfsig.recurrences.pieces import pieces_of, point_spacing
+from surfsig.recurrences.pieces import pieces_of
 from surfsig.recurrences.shadows import Region, direction_of_sensor, places_without_points, second_place
+from surfsig.spacing import point_spacing
 from surfsig.surfaces import Surface, Surfaces
 from surfsig.surfaces.surface import described
 

@@ -32,6 +32,7 @@ from surfsig.files import (
 )
 from surfsig.finding import Instance, Instances, Library, LibraryEntry, find
 from surfsig.flat_atom import flat_atom_length
+from surfsig.missing_returns import remove_missing_returns
 from surfsig.odometry import Odometry, ScanStatus, odometry
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import Recurrence, Recurrences, recurrences
@@ -39,6 +40,7 @@ from surfsig.registration import Registration, register
 from surfsig.shapes import FittedShape, fit_cylinder, fit_plane, fit_sphere
 from surfsig.similarity import flipped, similarity, similarity_class, similarity_matrix
 from surfsig.surfaces import PointClass, Surface, Surfaces, surfaces
+from surfsig.units import unit_mismatch
 
 __all__ = [
     "INSTRUCTION_SET",
@@ -87,12 +89,14 @@ __all__ = [
     "read_trajectory",
     "recurrences",
     "register",
+    "remove_missing_returns",
     "remove_outliers",
     "scan_sequence",
     "similarity",
     "similarity_class",
     "similarity_matrix",
     "surfaces",
+    "unit_mismatch",
     "write",
     "write_covariances",
     "write_trajectory",

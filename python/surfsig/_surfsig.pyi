@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "COARSEST_STEP",
     "FEWEST_SURFACE_POINTS",
     "GOOD",
     "INSTRUCTION_SET",
@@ -20,6 +21,7 @@ __all__ = [
     "SurfaceIndex",
     "SurfacePlaces",
     "__version__",
+    "coordinate_steps",
     "extract",
     "field_distinctiveness",
     "field_signatures",
@@ -34,9 +36,11 @@ STATUS_NAMES: list[str]
 KIND_PARAMETERS: dict[str, int]
 FEWEST_SURFACE_POINTS: int
 INSTRUCTION_SET: str
+COARSEST_STEP: float
 OPTIMAL: float
 GOOD: float
 
+def coordinate_steps(points: NDArray[np.floating], *, origin: Sequence[float]) -> tuple[float, float]: ...
 def extract(
     points: NDArray[np.floating],
     *,

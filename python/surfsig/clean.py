@@ -18,6 +18,7 @@ from surfsig.convert.libraries import library
 from surfsig.defaults import OUTLIER_NEIGHBORS, OUTLIER_STD_RATIO
 from surfsig.errors import InvalidInputError
 from surfsig.files.options import box_array, cropped
+from surfsig.missing_returns import remove_missing_returns
 from surfsig.point_cloud import PointCloud
 
 LATTICE_LIMIT = 1 << 43
@@ -128,7 +129,8 @@ def remove_outliers(
     Parameters
     ----------
     cloud
-        What `PointCloud.of` takes. Points that are not finite are dropped.
+        What `PointCloud.of` takes. Points that are not finite are dropped, and so are missing returns
+        (`remove_missing_returns`), whose many copies of one place would pass for dense surface.
     neighbors
         How many nearest points; at least 1. A cloud that has fewer is measured with what there is.
     std_ratio
@@ -153,7 +155,7 @@ def remove_outliers(
         raise InvalidInputError(f"std_ratio must be a number, not {std_ratio!r:.40}") from None
     if not 0 <= ratio < np.inf:
         raise InvalidInputError(f"std_ratio must be a finite number from 0 on, not {ratio:g}")
-    cloud = _finite_part(PointCloud.of(cloud))
+    cloud = _finite_part(remove_missing_returns(cloud))
     workers = thread_count(threads) or os.cpu_count() or 1
     # With two points, both are as far from their nearest: there is nothing to compare.
     if len(cloud) < 3:

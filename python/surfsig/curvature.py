@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -18,10 +19,11 @@ from surfsig.arguments import (
 )
 from surfsig.defaults import AXES, FIT, Axes, Fit
 from surfsig.errors import InvalidInputError
-from surfsig.extraction import Extraction
+from surfsig.extraction import Extraction, Status
 from surfsig.orientation import orientation
 from surfsig.places import places
 from surfsig.point_cloud import PointCloud
+from surfsig.resolution import step_text
 
 
 def extract(
@@ -96,6 +98,12 @@ def extract(
     ------
     InvalidInputError
         If an argument has no meaning; its text says which.
+
+    Warns
+    -----
+    UserWarning
+        If coordinates come in steps that are too large for the radius; the places that suffer have the status
+        ``TOO_COARSE``, and no curvature.
     """
     if radius is None and neighbors is None:
         raise InvalidInputError("give a radius, or neighbors, or both")
@@ -194,6 +202,13 @@ class _Job:
             progress=self.progress,
         )
         sizes = radius if isinstance(radius, Sequence) and not isinstance(radius, str) else [radius]
+        too_coarse = max(int((arrays["status"] == Status.TOO_COARSE).sum()) for arrays in found)
+        if too_coarse:
+            warnings.warn(
+                f"{step_text(cloud)}, too coarse for the radius: {too_coarse} of "
+                f"{len(points)} places have no curvature (status too_coarse)",
+                stacklevel=3,
+            )
         return [
             Extraction(
                 radius=arrays.pop("radius", size),

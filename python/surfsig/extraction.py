@@ -45,6 +45,9 @@ class Status(enum.IntEnum):
     ONE_SIDED = 6
     """The points lie mostly on one side of the place (a rim): all values are there, with larger standard
     errors, and biased where the surface is no paraboloid."""
+    TOO_COARSE = 7
+    """Coordinates come in steps too large for the radius (float32 at UTM coordinates): no curvature, and a
+    normal of the points as they are."""
 
 
 class FitUsed(enum.IntEnum):

@@ -82,6 +82,10 @@ enum surfsig_status
    * errors of such a patch, and a bias where the surface is not a paraboloid.
    */
   SURFSIG_STATUS_ONE_SIDED = 6,
+  /**
+   * Coordinates come in steps too large for the radius: no curvature, and a normal of the points as they are.
+   */
+  SURFSIG_STATUS_TOO_COARSE = 7,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

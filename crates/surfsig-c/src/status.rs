@@ -23,11 +23,13 @@ pub enum surfsig_status {
     /// The points lie mostly on one side, as at the rim of a scan: all values are there, with the standard
     /// errors of such a patch, and a bias where the surface is not a paraboloid.
     OneSided = 6,
+    /// Coordinates come in steps too large for the radius: no curvature, and a normal of the points as they are.
+    TooCoarse = 7,
 }
 
 // Columns of the core's statuses are handed out as they are: the numbers must be the same.
 const _: () = {
-    assert!(Status::ALL.len() == 7);
+    assert!(Status::ALL.len() == 8);
     assert!(surfsig_status::Ok as u8 == Status::Ok as u8);
     assert!(surfsig_status::NotFinite as u8 == Status::NotFinite as u8);
     assert!(surfsig_status::TooFewPoints as u8 == Status::TooFewPoints as u8);
@@ -35,6 +37,7 @@ const _: () = {
     assert!(surfsig_status::NotConverged as u8 == Status::NotConverged as u8);
     assert!(surfsig_status::OutsideVocabulary as u8 == Status::OutsideVocabulary as u8);
     assert!(surfsig_status::OneSided as u8 == Status::OneSided as u8);
+    assert!(surfsig_status::TooCoarse as u8 == Status::TooCoarse as u8);
 };
 
 static NAMES: LazyLock<[CString; Status::ALL.len()]> =

@@ -8,7 +8,8 @@ use pyo3::types::PyDict;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 use surfsig::{
-    ExtractOptions, Extraction, FitAxes, FitKind, Monitor, Neighborhood, Offsets, PointCloud, Queries, Radius,
+    ExtractOptions, Extraction, FitAxes, FitKind, Monitor, Neighborhood, Offsets, PointCloud, Queries,
+    Radius, Resolution,
 };
 
 /// How often the interpreter is asked for signals and told the progress.
@@ -220,4 +221,16 @@ pub fn voxel_representatives<'py>(
     let voxel = Radius::new(voxel).map_err(to_python)?;
     let found = py.detach(|| surfsig::voxel_representatives(&cloud, voxel)).map_err(to_python)?;
     Ok(found.into_pyarray(py))
+}
+
+/// The largest step between float32 numbers where coordinates are such, and that of a lattice where they are
+/// multiples of one; see `surfsig.resolution`.
+#[pyfunction]
+#[pyo3(signature = (points, *, origin))]
+pub fn coordinate_steps(points: Points<'_>, origin: [f64; 3]) -> PyResult<(f64, f64)> {
+    let cloud = points.cloud(origin)?;
+    let resolution = Resolution::of(&cloud);
+    let positions = (0..cloud.len()).filter_map(|i| cloud.position(i));
+    let number_step = positions.map(|p| resolution.number_step(p)).fold(0.0, f64::max);
+    Ok((number_step, resolution.lattice.into_iter().fold(0.0, f64::max)))
 }

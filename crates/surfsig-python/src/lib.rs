@@ -57,7 +57,7 @@ mod _surfsig {
     #[pymodule_export]
     use crate::e57::{E57Reader, write_e57};
     #[pymodule_export]
-    use crate::extract::{extract, voxel_representatives};
+    use crate::extract::{coordinate_steps, extract, voxel_representatives};
     #[pymodule_export]
     use crate::field::{field_distinctiveness, field_signatures};
     #[pymodule_export]
@@ -79,6 +79,7 @@ mod _surfsig {
         let parameters = surfsig::SurfaceKind::ALL.map(|kind| (kind.name(), kind.parameters()));
         module.add("KIND_PARAMETERS", parameters.into_py_dict(module.py())?)?;
         module.add("FEWEST_SURFACE_POINTS", surfsig::FEWEST_SURFACE_POINTS)?;
+        module.add("COARSEST_STEP", surfsig::COARSEST_STEP)?;
         module.add("INSTRUCTION_SET", surfsig::InstructionSet::detect().name())?;
         module.add("OPTIMAL", surfsig::OPTIMAL)?;
         module.add("GOOD", surfsig::GOOD)

@@ -12,12 +12,12 @@ from surfsig.arguments import positive_length
 from surfsig.curvature import extract
 from surfsig.errors import InvalidInputError
 from surfsig.field import FieldSignatures, field_signatures
-from surfsig.finding.visible_from import seen_from
 from surfsig.orientation import orientation
 from surfsig.point_cloud import PointCloud
-from surfsig.recurrences.pieces import point_spacing
 from surfsig.registration.motion import about_zero
 from surfsig.registration.sides import one_sided_normals
+from surfsig.spacing import point_spacing
+from surfsig.visibility import seen_from
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,11 @@ from scipy.spatial import cKDTree
 from surfsig._surfsig import DepthImage, SurfaceIndex, SurfacePlaces
 from surfsig.field import FieldSignatures, field_signatures
 from surfsig.finding.model import PLACES, sides_of, surface_places
-from surfsig.finding.visible_from import seen_from
+from surfsig.missing_returns import missing_returns
 from surfsig.point_cloud import PointCloud
-from surfsig.recurrences.pieces import point_spacing
 from surfsig.registration.motion import about_zero
+from surfsig.spacing import point_spacing
+from surfsig.visibility import seen_from
 
 Array = NDArray[np.float64]
 
@@ -57,9 +58,9 @@ class Scene:
     def __init__(self, cloud: PointCloud, radius: float, threads: int | None) -> None:
         """Take a cloud; `radius` is of patches over which its surface's side is told."""
         self.given = cloud
-        self._cloud, self.middle = about_zero(cloud)
-        self.numbers = np.flatnonzero(cloud.finite)
+        self.numbers = np.flatnonzero(cloud.finite & ~missing_returns(cloud))
         """Of the points in the cloud that was given."""
+        self._cloud, self.middle = about_zero(cloud.at(self.numbers))
         self.points: Array = self._cloud.offsets
         self.spacing = point_spacing(self.points)
         self.threads = threads

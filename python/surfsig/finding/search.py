@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -18,11 +19,14 @@ from surfsig.finding.library import Library
 from surfsig.finding.model import FEWEST, SPACINGS, Model, model_of
 from surfsig.finding.proposals import proposed_poses
 from surfsig.finding.scene import Scene
+from surfsig.missing_returns import missing_returns, missing_returns_text
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences.alignment import inverse
 from surfsig.recurrences.free_directions import free_directions
 from surfsig.registration.contact import Surface, contact, spread
 from surfsig.registration.motion import shifted
+from surfsig.resolution import warn_if_too_coarse
+from surfsig.units import ratio_text
 
 Array = NDArray[np.float64]
 
@@ -105,19 +109,37 @@ def find(
         If an argument has no meaning; its text says which.
     FileFormatError
         If a library's file is damaged.
+
+    Warns
+    -----
+    UserWarning
+        If missing returns of the scene are left out, its coordinates are too coarse, or nothing is found and
+        a model seems to be in another unit than the scene.
     """
     least = _score(score)
     threads = thread_count(threads)
     cloud = PointCloud.of(scene)
+    missing = int(missing_returns(cloud).sum())
+    if missing:
+        told = missing_returns_text(missing, len(cloud))
+        warnings.warn(f"the scene: {told}; they are left out", stacklevel=2)
     models = _models(model, threads)
     if int(cloud.finite.sum()) < FEWEST or not models:
         return Instances([], cloud, {})
     candidates: list[_Candidate] = []
+    warn_if_too_coarse(cloud, max(part.radius for part in models.values()), "the scene: patches")
     prepared = Scene(cloud, min(part.radius for part in models.values()), threads)
     eye = prepared.eye() if prepared.sided else None
     for name, part in models.items():
         candidates += _candidates(name, part, prepared, eye, least, threads)
-    return _accepted(candidates, prepared, least)
+    found = _accepted(candidates, prepared, least)
+    if not len(found):
+        for name, part in models.items():
+            relation = "has points {ratio} times as far apart as"
+            hint = ratio_text(part.spacing, prepared.spacing, (f"the model '{name}'", "the scene"), relation)
+            if hint is not None:
+                warnings.warn(f"nothing was found, and {hint}", stacklevel=2)
+    return found
 
 
 def _models(model: object, threads: int | None) -> dict[str, Model]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sized
 from pathlib import Path
 from typing import Any
@@ -78,7 +79,8 @@ def odometry(
     Warns
     -----
     UserWarning
-        If a file cannot be read, which then counts as a scan without points, or a bag ends too early.
+        If a file cannot be read, which then counts as a scan without points, a bag ends too early, or missing
+        returns at (0, 0, 0) are left out.
     """
     edge, partners, around = (
         None if value is None else positive_length(value, name)
@@ -99,6 +101,12 @@ def odometry(
             progress(number + 1, number + 1 if total is None else total)
     if not len(way):
         raise InvalidInputError("there are no scans")
+    if way.missing_returns:
+        warnings.warn(
+            f"{way.missing_returns} points of {len(way)} scans are at (0, 0, 0), where a lidar's missing "
+            "returns are written; they are left out",
+            stacklevel=2,
+        )
     return way.result()
 
 

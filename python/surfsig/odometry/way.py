@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from surfsig.clean import COORDINATE_LIMIT
 from surfsig.files.sequence import TimedScan
+from surfsig.missing_returns import remove_missing_returns
 from surfsig.odometry.alignment import Scan
 from surfsig.odometry.motion import adjoint
 from surfsig.odometry.result import Odometry, ScanStatus
@@ -34,6 +35,8 @@ class Way:
         self._is_placed = False
         self._first = 0
         """The first scan that has a pose."""
+        self.missing_returns = 0
+        """Points at (0, 0, 0) that were left out."""
         self._timestamps: list[float] = []
         self._sensors: list[Array] = []
         self._steps: list[Placed] = []
@@ -44,7 +47,9 @@ class Way:
 
     def add(self, scan: TimedScan) -> None:
         """Find the pose of the next scan."""
-        points, sensor = self._about_sensor(scan.cloud)
+        cloud = remove_missing_returns(scan.cloud)
+        self.missing_returns += len(scan.cloud) - len(cloud)
+        points, sensor = self._about_sensor(cloud)
         self._timestamps.append(scan.timestamp)
         self._sensors.append(sensor)
         nothing = np.full((4, 4), np.nan), np.full((6, 6), np.nan)

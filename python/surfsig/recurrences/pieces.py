@@ -16,19 +16,8 @@ _LINK = 3.0
 """Point spacings between neighbours that hang together."""
 _CARRIED = 3
 """Pieces that a support carries at least; the faces of one object seldom have more than two beside them."""
-_MEASURED = 20_000
-"""Points that tell the spacing of all."""
 _THICKNESS = 4.0
 """Standard deviations about a support within which points are its own."""
-
-
-def point_spacing(points: Array) -> float:
-    """Median distance of a point to its nearest other one; of many points, by a fixed choice of them."""
-    asked = points
-    if len(points) > _MEASURED:
-        asked = points[np.random.default_rng(0).choice(len(points), _MEASURED, replace=False)]
-    distances, _ = cKDTree(points).query(asked, k=2)
-    return float(np.median(distances[:, 1]))
 
 
 def pieces_of(

@@ -9,11 +9,12 @@ from surfsig.curvature import extract
 from surfsig.errors import InvalidInputError
 from surfsig.extraction import Extraction
 from surfsig.flat_atom import flat_atom_length
-from surfsig.recurrences.pieces import pieces_of, point_spacing
+from surfsig.recurrences.pieces import pieces_of
 from surfsig.recurrences.result import Piece
 from surfsig.recurrences.shadows import Region, places_without_points
 from surfsig.recurrences.standpoint import Standpoint
 from surfsig.recurrences.view import View, view_of
+from surfsig.spacing import point_spacing
 from surfsig.surfaces import Surfaces
 
 Array = NDArray[np.float64]

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, Delaunay, cKDTree
 
+from surfsig.visibility import hidden_from
+
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _STEP, _STEEPEST = 10.0, 60.0
 """Degrees between the first directions that are tried, and from the support's normal or the known place."""
@@ -22,8 +23,6 @@ _REFINED = (5.0, 2.5)
 """Degrees of the later steps."""
 _LINK = 2.0
 """Point spacings to the next point from which on nothing was measured."""
-_MARGIN, _CELL = 4.0, 1.5
-"""Point spacings in front of a place from which on something hides it; between lines of sight."""
 _AGAINST = 5.0
 """What the share of hidden points counts against the share of explained shadows: no point is hidden."""
 _EXPLAINED = 0.3
@@ -58,20 +57,6 @@ def places_without_points(support: Array, spacing: float) -> Array:
     gap, _ = cKDTree(flat).query(grid, distance_upper_bound=_LINK * spacing)
     inside = Delaunay(flat[ConvexHull(flat).vertices]).find_simplex(grid) >= 0
     return np.asarray(middle + grid[np.isinf(gap) & inside] @ axes)
-
-
-def hidden_from(direction: Array, places: Array, points: Array, spacing: float) -> Mask:
-    """Tell which places (m, 3) have points of a scan before them, seen from far away along a unit vector."""
-    across = np.linalg.svd(direction[None])[2][1:]
-    if not len(places):
-        return np.zeros(0, np.bool_)
-    cells = [np.floor(part @ across.T / (_CELL * spacing)).astype(np.int64) for part in (points, places)]
-    low = np.minimum(cells[0].min(axis=0), cells[1].min(axis=0))
-    width = int(max(cells[0][:, 1].max(), cells[1][:, 1].max()) - low[1] + 1)
-    taken, asked = ((cell - low) @ [width, 1] for cell in cells)
-    front = np.full(int(max(taken.max(), asked.max())) + 1, -np.inf)
-    np.maximum.at(front, taken, points @ direction)
-    return np.asarray(front[asked] > places @ direction + _MARGIN * spacing)
 
 
 def second_place(regions: Sequence[Region], eyes: Sequence[Array], spacing: float) -> Array | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -9,6 +11,7 @@ from surfsig.arguments import positive_length, thread_count, whole_number
 from surfsig.defaults import REGISTRATION_KEYPOINTS
 from surfsig.errors import InvalidInputError
 from surfsig.field import FieldSignatures, keypoints, match_fields
+from surfsig.missing_returns import without_missing_returns
 from surfsig.orientation import orientation
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences.free_directions import free_directions
@@ -18,6 +21,8 @@ from surfsig.registration.motion import about_zero, shifted
 from surfsig.registration.refinement import Refiner
 from surfsig.registration.registration import Registration
 from surfsig.registration.sides import one_sided_normals
+from surfsig.resolution import warn_if_too_coarse
+from surfsig.units import unit_mismatch
 
 Array = NDArray[np.float64]
 
@@ -56,7 +61,8 @@ def register(
     Parameters
     ----------
     source, target
-        `PointCloud`, arrays (n, 3) of numbers, or any other that `PointCloud.of` takes; in one unit.
+        `PointCloud`, arrays (n, 3) of numbers, or any other that `PointCloud.of` takes; in one unit. Missing
+        returns at (0, 0, 0) are left out.
     init
         T_target_source, (4, 4), roughly, where somebody knows it: it is refined, and nothing is searched.
     radius
@@ -76,16 +82,43 @@ def register(
     ------
     InvalidInputError
         If an argument has no meaning, or small_gicp is not installed; its text says which.
+
+    Warns
+    -----
+    UserWarning
+        If missing returns are left out, coordinates are too coarse, or no trusted pose is found and the
+        clouds seem to be in different units (`unit_mismatch`).
     """
-    clouds = [PointCloud.of(cloud) for cloud in (source, target)]
+    clouds = [
+        without_missing_returns(PointCloud.of(cloud), name)
+        for cloud, name in ((source, "source"), (target, "target"))
+    ]
     start = None if init is None else _pose(init)
     most = whole_number(count, "count", 2**32 - 1)
-    threads = thread_count(threads)
-    (ours, from_ours), (theirs, from_theirs) = (about_zero(cloud) for cloud in clouds)
+    if radius is not None:
+        radius = positive_length(radius, "radius")
+    found = _registered(clouds[0], clouds[1], start, radius, most, thread_count(threads))
+    for cloud, name in zip(clouds, ("source", "target"), strict=True):
+        warn_if_too_coarse(cloud, found.radius, f"{name}: patches")
+    hint = None if found.trusted else unit_mismatch(clouds[0], clouds[1], ("source", "target"))
+    if hint is not None:
+        warnings.warn(hint, stacklevel=2)
+    return found
+
+
+def _registered(
+    source: PointCloud,
+    target: PointCloud,
+    start: Array | None,
+    radius: float | None,
+    most: int,
+    threads: int | None,
+) -> Registration:
+    (ours, from_ours), (theirs, from_theirs) = (about_zero(cloud) for cloud in (source, target))
     sizes = [
         float(np.median(np.linalg.norm(cloud.offsets, axis=1))) for cloud in (ours, theirs) if len(cloud)
     ]
-    size = _PATCH * min(sizes, default=0.0) if radius is None else positive_length(radius, "radius")
+    size = _PATCH * min(sizes, default=0.0) if radius is None else radius
     if min(len(ours), len(theirs)) < _FEWEST or size == 0.0:
         return _nothing(size)
     pairs = None

@@ -188,6 +188,61 @@ impl CellIndex {
         Ok(Self { lattice, rows, row_of_key: met, x, y, z, point_of_rank })
     }
 
+    /// The same index with at most so many points in one place, the first ones; `None` where no place has more.
+    ///
+    /// Thousands of equal points, such as missing returns at (0, 0, 0), would else be looked at for each of them.
+    pub(crate) fn with_copies(&self, most: usize) -> Option<Self> {
+        let place = |rank: usize| [self.x[rank], self.y[rank], self.z[rank]].map(f32::to_bits);
+        let mut kept = vec![true; self.len()];
+        let mut counts: FxHashMap<[u32; 3], usize> = FxHashMap::default();
+        let mut surplus = false;
+        for row in &self.rows {
+            let x = &self.x[row.start..row.end];
+            let mut start = row.start;
+            // Rows ascend in x: equal points are among those of equal x.
+            for run in x.chunk_by(|a, b| a == b) {
+                let ranks = start..start + run.len();
+                start = ranks.end;
+                if ranks.len() <= most {
+                    continue;
+                }
+                counts.clear();
+                for rank in ranks {
+                    let count = counts.entry(place(rank)).or_default();
+                    *count += 1;
+                    kept[rank] = *count <= most;
+                    surplus |= *count > most;
+                }
+            }
+        }
+        surplus.then(|| self.with_only(&kept))
+    }
+
+    /// The same index with some of its points; no row ends without one.
+    fn with_only(&self, kept: &[bool]) -> Self {
+        let ranks = |range: std::ops::Range<usize>| range.filter(|&rank| kept[rank]);
+        let column = |values: &[f32]| {
+            let mut column: Vec<f32> = ranks(0..self.len()).map(|rank| values[rank]).collect();
+            column.resize(column.len() + PADDING, 0.0);
+            column
+        };
+        let mut end = 0;
+        let rows = self.rows.iter().map(|row| {
+            let start = end;
+            end += ranks(row.start..row.end).count();
+            Row { key: row.key, start, end }
+        });
+        Self {
+            lattice: self.lattice,
+            rows: rows.collect(),
+            row_of_key: self.row_of_key.clone(),
+            x: column(&self.x),
+            y: column(&self.y),
+            z: column(&self.z),
+            point_of_rank: ranks(0..self.len()).map(|rank| self.point_of_rank[rank]).collect(),
+        }
+    }
+
     /// Number of points, those that are not finite left out.
     ///
     /// ```

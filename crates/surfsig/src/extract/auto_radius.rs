@@ -70,7 +70,9 @@ pub fn extract_auto_radius(
         let first = (step / f64::from(STEPS - 1)).floor() as i32;
         let mut climb = Climb { cloud, queries, options, monitor, lowest: first - PASSES_BELOW, found: None };
         climb.from(first, (0..queries.len(cloud)).collect())?;
-        climb.found.map(|(best, _)| best).ok_or(Error::Cancelled)
+        let (mut best, _) = climb.found.ok_or(Error::Cancelled)?;
+        best.mark_too_coarse(cloud, queries);
+        Ok(best)
     })?
 }
 

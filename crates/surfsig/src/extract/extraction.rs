@@ -1,8 +1,9 @@
 //! What an extraction gives: one struct of arrays, a status per point.
 
-use super::Status;
+use super::{Queries, Status};
 use crate::curvature::Paraboloid;
 use crate::fit::{FitAxes, FitUsed};
+use crate::{PointCloud, Resolution};
 
 /// Curvature and what belongs to it, one entry for each query, in the order of the queries.
 ///
@@ -111,6 +112,43 @@ impl Extraction {
         take.over(&mut self.planarity, &with.planarity);
         take.over(&mut self.scattering, &with.scattering);
         take.over(&mut self.coefficients, &with.coefficients);
+    }
+
+    /// Marks the queries whose coordinates are too coarse for their radius, and takes their curvature away.
+    pub(super) fn mark_too_coarse(&mut self, cloud: &PointCloud<'_>, queries: &Queries<'_>) {
+        let resolution = Resolution::of(cloud);
+        if !resolution.single_precision && resolution.lattice == [0.0; 3] {
+            return;
+        }
+        for (i, position) in queries.positions(cloud).enumerate() {
+            let valued = match self.status[i] {
+                Status::NotFinite | Status::TooFewPoints => false,
+                // The nearest points may be in one place, and then have no radius to speak of.
+                Status::Degenerate => self.radii.is_empty(),
+                _ => true,
+            };
+            if valued && resolution.is_too_coarse(position, self.normals[i], self.radius_of(i)) {
+                self.status[i] = Status::TooCoarse;
+                for column in [
+                    &mut self.k1,
+                    &mut self.k2,
+                    &mut self.residual,
+                    &mut self.condition,
+                    &mut self.mean_curvature_std,
+                    &mut self.k1_std,
+                    &mut self.k2_std,
+                ] {
+                    column[i] = f32::NAN;
+                }
+                self.directions[i] = [f32::NAN; 3];
+                if let Some(used) = self.fit_used.get_mut(i) {
+                    *used = FitUsed::None;
+                }
+                if let Some(coefficients) = self.coefficients.get_mut(i) {
+                    *coefficients = [f32::NAN; 6];
+                }
+            }
+        }
     }
 
     /// The fitted paraboloid of a query in patch units (lengths divided by the patch's side, twice

@@ -32,6 +32,7 @@ use columns::{Columns, ColumnsPart};
 use neighborhood::first_radius;
 use rayon::prelude::*;
 use shares::{Share, shares};
+use std::sync::Mutex;
 use worker::Worker;
 
 /// How an extraction is done.
@@ -113,7 +114,10 @@ pub fn extract_monitored(
     let neighborhood = neighborhood.into();
     neighborhood.check()?;
     check(cloud, queries, options)?;
-    with_threads(options.threads, || extract_within(cloud, neighborhood, queries, options, monitor))?
+    let mut found =
+        with_threads(options.threads, || extract_within(cloud, neighborhood, queries, options, monitor))??;
+    found.mark_too_coarse(cloud, queries);
+    Ok(found)
 }
 
 /// The same, on the threads that are there, with options that go together.
@@ -156,10 +160,9 @@ fn run_nearest(
 ) -> Result<Extraction, Error> {
     let mut radius = first_radius(cloud, k, monitor)?;
     let nearest = Neighborhood::Nearest(k);
-    let Found { mut of_balls, index, .. } =
+    let Found { mut of_balls, mut left } =
         run(cloud, &Balls::one(radius), nearest, queries, options, monitor)?;
     let mut found = of_balls.swap_remove(0);
-    let mut left = unresolved(&found, k, &index);
     while !left.is_empty() {
         // The count of what is done starts again for those that need more.
         monitor.take_back(left.len());
@@ -169,17 +172,9 @@ fn run_nearest(
         })?;
         found.radius = radius.get();
         found.take_over(left.iter().copied().zip(0..), &more.of_balls[0]);
-        let still = unresolved(&more.of_balls[0], k, &more.index);
-        left = still.into_iter().map(|i| left[i]).collect();
+        left = more.left.into_iter().map(|i| left[i]).collect();
     }
     Ok(found)
-}
-
-/// The queries that have fewer than k points where there are more.
-fn unresolved(found: &Extraction, k: usize, index: &CellIndex) -> Vec<usize> {
-    let enough = k.min(index.len());
-    let short = |&i: &usize| (found.count[i] as usize) < enough && found.status[i] != Status::NotFinite;
-    (0..found.len()).filter(short).collect()
 }
 
 /// Does something with some of the queries, and with the options that belong to them.
@@ -213,8 +208,8 @@ impl Balls<'_> {
 struct Found {
     /// Of each ball.
     of_balls: Vec<Extraction>,
-    index: CellIndex,
-    /// The queries in dense places, where several balls are not walked at once.
+    /// The queries for which more is to be done, in their order: those in dense places, where several balls are
+    /// not walked at once, and those that have fewer than the nearest points that are wanted.
     left: Vec<usize>,
 }
 
@@ -226,19 +221,21 @@ fn run(
     options: &ExtractOptions<'_>,
     monitor: &Monitor,
 ) -> Result<Found, Error> {
-    let index = CellIndex::of_positions(cloud.len(), |i| cloud.position(i), balls.largest, monitor)?;
+    let whole = CellIndex::of_positions(cloud.len(), |i| cloud.position(i), balls.largest, monitor)?;
     let elsewhere = queries.index(cloud, balls.largest, monitor)?;
-    let asked = elsewhere.as_ref().unwrap_or(&index);
+    let asked = elsewhere.as_ref().unwrap_or(&whole);
+    // Of equal points no more than are wanted can be among the nearest, and one more says that there are more.
+    let thinned = neighborhood.most().and_then(|most| whole.with_copies(most.saturating_add(1)));
+    let index = thinned.as_ref().unwrap_or(&whole);
     let own_radii = !matches!(neighborhood, Neighborhood::Ball(_));
     let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
     let dense = (matches!(neighborhood, Neighborhood::Ball(_)) && !options.robust).then_some(DENSE);
-    let mut shares = shares(&index, asked, dense);
+    let mut shares = shares(index, asked, dense);
     let mut left = Vec::new();
     if balls.radii.len() > 1 {
         let dense = shares.extract_if(.., |share| matches!(share, Share::Region { .. }));
         left = dense.flat_map(|share| share.ranks().collect::<Vec<_>>()).collect();
         left.iter_mut().for_each(|rank| *rank = asked.point_of_rank[*rank] as usize);
-        left.sort_unstable();
     }
     let lengths: Vec<usize> = shares.iter().map(Share::len).collect();
     let entries = lengths.iter().sum();
@@ -254,10 +251,15 @@ fn run(
         }
     }
     // One by one, since some are large.
+    let short = Mutex::new(Vec::new());
     shares.iter().zip(parts).par_bridge().try_for_each_init(
-        || Worker::new(&index, asked, neighborhood, balls.radii, options, set),
+        || Worker::new(index, asked, neighborhood, balls.radii, options, set),
         |worker, (share, mut parts)| match share {
-            Share::Direct(runs) => worker.extract(runs, &mut parts, monitor),
+            Share::Direct(runs) => {
+                let found = worker.extract(runs, &mut parts, monitor)?;
+                short.lock().expect("no thread panics with the lock").extend(found);
+                Ok(())
+            }
             Share::Region { corner, cells } => worker.extract_region(*corner, cells, &mut parts, monitor),
         },
     )?;
@@ -267,5 +269,10 @@ fn run(
         columns.finish(queries.len(cloud), query_of_entry, options.axes, oriented)
     };
     let of_balls = columns.into_iter().map(finish).collect();
-    Ok(Found { of_balls, index, left })
+    left.extend(
+        short.into_inner().expect("no thread panics with the lock").into_iter().map(|query| query as usize),
+    );
+    // Threads end in any order.
+    left.sort_unstable();
+    Ok(Found { of_balls, left })
 }

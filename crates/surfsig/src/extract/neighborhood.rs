@@ -49,6 +49,14 @@ impl Neighborhood {
             _ => Ok(()),
         }
     }
+
+    /// Most points that count, where it is not all of a ball.
+    pub(super) fn most(&self) -> Option<usize> {
+        match *self {
+            Self::Ball(_) => None,
+            Self::Nearest(most) | Self::Hybrid { most, .. } => Some(most),
+        }
+    }
 }
 
 /// A radius that holds k points around three quarters of the points, estimated at a few of them; later
@@ -62,6 +70,7 @@ pub(super) fn first_radius(cloud: &PointCloud<'_>, k: usize, monitor: &Monitor) 
 }
 
 /// Distances to the k-th nearest point, the smallest first, at a few of the points; and the largest coordinate.
+/// Where k points are in one place, the distance to the nearest other place.
 pub(super) fn distances_to_nearest(
     cloud: &PointCloud<'_>,
     k: usize,
@@ -78,7 +87,10 @@ pub(super) fn distances_to_nearest(
             let square = |p: &[f64; 3]| (0..3).map(|a| (p[a] - centre[a]).powi(2)).sum::<f64>();
             let mut squares: Vec<f64> = positions.iter().map(square).collect();
             let nth = k.min(squares.len()) - 1;
-            Ok(squares.select_nth_unstable_by(nth, f64::total_cmp).1.sqrt())
+            let (_, &mut square, farther) = squares.select_nth_unstable_by(nth, f64::total_cmp);
+            let positive = |&square: &f64| square > 0.0;
+            let nearest = || farther.iter().copied().filter(positive).min_by(f64::total_cmp);
+            Ok(Some(square).filter(positive).or_else(nearest).unwrap_or(0.0).sqrt())
         })
         .collect::<Result<Vec<f64>, Error>>()?;
     distances.sort_unstable_by(f64::total_cmp);

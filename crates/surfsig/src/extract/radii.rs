@@ -60,7 +60,9 @@ pub fn extract_radii(
         }
         Ok(())
     })??;
-    Ok(found.into_iter().flatten().collect())
+    let mut found: Vec<Extraction> = found.into_iter().flatten().collect();
+    found.iter_mut().for_each(|of_radius| of_radius.mark_too_coarse(cloud, queries));
+    Ok(found)
 }
 
 /// Balls of radii that can be walked together, the largest first.

@@ -26,11 +26,13 @@ pub enum Status {
     /// The points lie mostly on one side, as at the rim of a scan: all values are there, with the standard
     /// errors of such a patch, and a bias where the surface is not a paraboloid.
     OneSided = 6,
+    /// Coordinates come in steps too large for the radius: no curvature, and a normal of the points as they are.
+    TooCoarse = 7,
 }
 
 impl Status {
     /// All of them, in the order of their numbers.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Ok,
         Self::NotFinite,
         Self::TooFewPoints,
@@ -38,6 +40,7 @@ impl Status {
         Self::NotConverged,
         Self::OutsideVocabulary,
         Self::OneSided,
+        Self::TooCoarse,
     ];
 
     /// The name, in lower case with underscores.
@@ -54,6 +57,7 @@ impl Status {
             Self::NotConverged => "not_converged",
             Self::OutsideVocabulary => "outside_vocabulary",
             Self::OneSided => "one_sided",
+            Self::TooCoarse => "too_coarse",
         }
     }
 }

@@ -27,6 +27,8 @@ pub(super) struct Worker<'a> {
     pub hierarchical: HierarchicalWalk<'a>,
     pub asked: &'a CellIndex,
     neighborhood: Neighborhood,
+    /// Points of a neighbourhood that needs no larger ball.
+    enough: usize,
     options: &'a ExtractOptions<'a>,
     set: InstructionSet,
     pub pending: Vec<Pending>,
@@ -37,6 +39,8 @@ pub(super) struct Worker<'a> {
     /// Of each pending query, where its points are looked at more than once.
     members: Vec<Members>,
     distances: Distances,
+    /// Queries with fewer than the nearest points that were asked for, of the runs at work.
+    short: Vec<u32>,
 }
 
 /// A query whose moments wait for their batch.
@@ -69,6 +73,7 @@ impl<'a> Worker<'a> {
             hierarchical: HierarchicalWalk::new(index, set),
             asked,
             neighborhood,
+            enough: neighborhood.most().unwrap_or(0).min(index.len()),
             options,
             set,
             pending: Vec::with_capacity(LANES),
@@ -76,16 +81,18 @@ impl<'a> Worker<'a> {
             shells: (radii.len() > 1).then(|| Shells::new(set, radii)),
             members: (0..LANES).map(|_| Members::new()).collect(),
             distances: Distances::default(),
+            short: Vec::new(),
         }
     }
 
-    /// Fills a part of each ball's columns with the queries of these runs of ranks, one after the other.
+    /// Fills a part of each ball's columns with the queries of these runs of ranks, one after the other. Returns
+    /// the queries whose balls hold fewer points than are wanted, and than there are.
     pub fn extract(
         &mut self,
         runs: &[Range<usize>],
         parts: &mut [ColumnsPart<'_>],
         monitor: &Monitor,
-    ) -> Result<(), Error> {
+    ) -> Result<Vec<u32>, Error> {
         let rows = &self.asked.rows;
         let mut entry = 0;
         for ranks in runs {
@@ -106,7 +113,7 @@ impl<'a> Worker<'a> {
         }
         self.fit_pending(parts);
         monitor.add(parts.iter().map(|part| part.len()).sum());
-        Ok(())
+        Ok(std::mem::take(&mut self.short))
     }
 
     /// Takes those of the first queries in `ranks` that are close enough together to share their
@@ -140,6 +147,12 @@ impl<'a> Worker<'a> {
                 self.around::<f32>(offset, lane, |_| true)
             };
             let query = self.asked.point_of_rank[rank];
+            // Before outliers leave, who would else be looked for again in larger and larger balls.
+            if matches!(self.neighborhood, Neighborhood::Nearest(_))
+                && self.members[lane].points.len() < self.enough
+            {
+                self.short.push(query);
+            }
             let entry = entry + rank - start;
             self.pending.push(Pending { key, offset, patch: None, entry, query, radius });
             if self.pending.len() == LANES && self.fit_pending(parts) {
