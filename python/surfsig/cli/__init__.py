@@ -6,9 +6,11 @@ can go wrong into one line and an exit code.
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import click
 
@@ -77,7 +79,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     arguments
         What follows the program's name; by default the process's own.
     """
-    with warnings.catch_warnings():
+    with _quiet_libraries(), warnings.catch_warnings():
+        # Warnings are for users; those of other categories (NumPy's, deprecations) are for developers.
+        warnings.simplefilter("ignore")
         warnings.simplefilter("always", UserWarning)
         warnings.showwarning = lambda message, *_: _say("warning", message)
         try:
@@ -109,6 +113,17 @@ def run(arguments: Sequence[str] | None = None) -> int:
 def main() -> None:
     """Run as a program."""
     sys.exit(run())
+
+
+@contextlib.contextmanager
+def _quiet_libraries() -> Iterator[None]:
+    """Keep what libraries log (laspy does) off stderr, where lines are this program's."""
+    handler, logging.lastResort = logging.lastResort, None
+    raising, logging.raiseExceptions = logging.raiseExceptions, False
+    try:
+        yield
+    finally:
+        logging.lastResort, logging.raiseExceptions = handler, raising
 
 
 def _say(kind: str, text: object) -> None:

@@ -10,6 +10,7 @@ import click
 from surfsig import defaults
 from surfsig.cli.console import number, print_json, print_table
 from surfsig.cli.options import CLOUD, axes_option, input_options, json_option, position, threads_option
+from surfsig.digits import position_text
 
 if TYPE_CHECKING:
     from surfsig import Extraction, PointCloud
@@ -83,7 +84,7 @@ def compare_command(
         rows, statuses = result.signatures(return_status=True)
         status = surfsig.Status(int(statuses[0])).name.lower()
         if not np.isfinite(rows).all():
-            where = ",".join(number(value) for value in spot)
+            where = position_text(spot, ",")
             why = f"{status.replace('_', ' ')} ({int(result.count[0])} points within {number(radius)})"
             raise surfsig.InvalidInputError(f"{file}: no signature at {where}: {why}")
         place: dict[str, Any] = {"file": str(file), "at": spot, "status": status}
@@ -101,7 +102,7 @@ def compare_command(
         return
     table = [("zeta", f"{number(zeta)} ({values['class']})")]
     for name, place in zip("AB", places, strict=True):
-        table.append((name, f"{place['file']} at {', '.join(number(value) for value in place['at'])}"))
+        table.append((name, f"{place['file']} at {position_text(place['at'])}"))
         curvature = f"k1 {number(place['k1'])}, k2 {number(place['k2'])} per unit"
         table.append(
             ("", f"{curvature}, from {place['count']:,} points, residual {number(place['residual'])}")

@@ -23,6 +23,7 @@ from surfsig.cli.options import (
     radius_or_auto,
     threads_option,
 )
+from surfsig.digits import position_text
 
 if TYPE_CHECKING:
     import numpy as np
@@ -164,9 +165,10 @@ def extract_command(
     summary |= {"signatures": signatures, **_summary(result, status), "seconds": seconds}
     summary["points_per_second"] = len(result) / seconds["extract"] if seconds["extract"] else None
     if len(result) and not np.isfinite(result.k1).any():
-        warnings.warn(
-            f"{output}: no point has a curvature; is the radius {number(typical)} right?", stacklevel=1
+        asked = (
+            f"the radius {number(typical)}" if neighbors is None else f"the number of neighbors {neighbors}"
         )
+        warnings.warn(f"{output}: no point has a curvature; is {asked} right?", stacklevel=1)
     if as_json:
         print_json(summary)
     elif shown:
@@ -194,7 +196,7 @@ def _similarity_to(
     signature, status = there.signatures(flat_atom=flat, return_status=True)
     if np.isnan(signature).any():
         why = surfsig.Status(int(status[0])).name.lower().replace("_", " ")
-        raise surfsig.InvalidInputError(f"--like: no signature at {','.join(map(number, place))}: {why}")
+        raise surfsig.InvalidInputError(f"--like: no signature at {position_text(place, ',')}: {why}")
     return result.similarity_to(signature[0])
 
 

@@ -10,6 +10,7 @@ import click
 from surfsig.cli.console import number, print_json, print_table
 from surfsig.cli.options import CLOUD, input_options, json_option, position
 from surfsig.defaults import INTERVAL
+from surfsig.digits import rounded, with_error
 
 if TYPE_CHECKING:
     from surfsig import FittedShape
@@ -84,8 +85,9 @@ def _rows(shape: FittedShape) -> list[tuple[str, str]]:
     rows = []
     if shape.kind != "plane":
         low, high = shape.interval
-        size = f"{number(shape.radius)} +- {shape.radius_std:.2g}"
-        rows.append(("radius", f"{size}, {INTERVAL:.0%} interval {number(low)} to {number(high)}"))
+        ends = " to ".join(rounded(end, shape.radius_std) for end in (low, high))
+        size = with_error(shape.radius, shape.radius_std)
+        rows.append(("radius", f"{size}, {INTERVAL:.0%} interval {ends}"))
     rows.append(("center", _with_errors(shape.center, errors[:3])))
     if shape.axis is not None:
         rows.append(("normal" if shape.kind == "plane" else "axis", _with_errors(shape.axis, errors[3:6])))
@@ -96,7 +98,7 @@ def _rows(shape: FittedShape) -> list[tuple[str, str]]:
 
 def _with_errors(values: Any, errors: Any) -> str:
     pairs = zip(values, errors, strict=True)
-    return ", ".join(f"{number(value)} +- {error:.2g}" for value, error in pairs)
+    return ", ".join(with_error(value, error) for value, error in pairs)
 
 
 for _command in (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import re
 import warnings
@@ -16,13 +15,10 @@ import numpy as np
 
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.ros_bag import BagTopic, bag_of
+from surfsig.files.timestamps import times_of_names
 from surfsig.point_cloud import PointCloud
 
 Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
-
-_NUMBER = re.compile(r"\d+(\.\d*)?")
-_SECONDS_DIGITS = 10
-"""Digits of a clock's time in seconds; with 3, 6 and 9 more it counts milli-, micro- and nanoseconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +53,8 @@ class ScanSequence:
 
     def __init__(self, parts: list[Path | BagTopic], reading: dict[str, Any]) -> None:
         self._parts, self._reading = parts, reading
-        self._times = _times(parts)
+        names = [part.stem for part in parts if isinstance(part, Path)]
+        self._times = times_of_names(names) if len(names) == len(parts) else None
 
     def __len__(self) -> int:
         """Return the number of scans."""
@@ -103,7 +100,8 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
     ScanSequence
         Gives a `TimedScan` each. A timestamp is that in a message's header; the number that the file's name
         is, in seconds, where all names are numbers that grow (whole ones of 13, 16 and 19 digits count
-        milli-, micro- and nanoseconds); otherwise the scan's number.
+        milli-, micro- and nanoseconds), or that of a clock at its end (cloud_SEC_NSEC, SEC.NSEC); otherwise
+        the scan's number.
 
     Raises
     ------
@@ -172,18 +170,3 @@ def _natural(path: Path) -> list[tuple[int, int, str]]:
     """Compare runs of digits as numbers; the name itself decides between 1 and 01."""
     words = re.split(r"(\d+)", str(path))
     return [(0, int(word), word) if word.isdecimal() else (1, 0, word) for word in words]
-
-
-def _times(parts: list[Path | BagTopic]) -> list[float] | None:
-    """Give the times that all files' names are, in seconds."""
-    names = [part.stem for part in parts if isinstance(part, Path) and _NUMBER.fullmatch(part.stem)]
-    if len(names) < len(parts):
-        return None
-    if all(name.isdecimal() for name in names):
-        digits = len(str(max(int(name) for name in names)))
-        unit = 1000 ** max(0, round((digits - _SECONDS_DIGITS) / 3))
-        times = [int(name) / unit for name in names]
-    else:
-        times = [float(name) for name in names]
-    grows = all(after > before for before, after in itertools.pairwise(times))
-    return times if grows else None

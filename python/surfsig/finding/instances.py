@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from surfsig.colors import GREY, distinct_colors
+from surfsig.digits import position_text
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences.free_directions import FreeDirection
 from surfsig.registration.motion import moved
@@ -201,7 +202,7 @@ class Instances:
                     instance.name,
                     f"{instance.score:.2f}",
                     f"{instance.visible:.0%}",
-                    " ".join(f"{value:.5g}" for value in instance.T_scene_model[:3, 3]),
+                    position_text(instance.T_scene_model[:3, 3], " "),
                     " ".join(f"{value:.1f}" for value in turn),
                     f"{instance.rms:.2g}",
                     f"{len(instance.indices)}",

@@ -94,7 +94,7 @@ def model_of(data: PointCloud | ArrayLike, radius: float | None = None, threads:
     Raises
     ------
     InvalidInputError
-        If it has too few points, or no extent.
+        If it has too few points, no extent, or no surface.
     """
     cloud = PointCloud.of(data)
     local, middle = about_zero(cloud)
@@ -123,6 +123,8 @@ def described(
 ) -> Model:
     """Describe points (n, 3) with normals (n, 3), of which the side counts."""
     places, facing, _ = surface_places(points, normals, max(radius / _VOXELS, spacing), threads)
+    if not len(places):
+        raise InvalidInputError("a model's points must lie on a surface: these have no normals")
     signatures = field_signatures(points, radius, voxel=radius / PLACES, normals=normals, threads=threads)
     return Model(points, middle, spacing, radius, places, facing, signatures.take(signatures.ok), sided)
 

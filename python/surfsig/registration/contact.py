@@ -215,4 +215,6 @@ def _alike(design: Array, heights: Array, places: Array, independent: Array) -> 
         return 1.0
     information = design.T @ design
     alike = clustered_covariance(design, heights, block)
-    return max(float(np.trace(alike @ information) / np.trace(independent @ information)), 1.0)
+    expected = float(np.trace(independent @ information))
+    # Without any noise nothing varies.
+    return max(float(np.trace(alike @ information)) / expected, 1.0) if expected > 0.0 else 1.0

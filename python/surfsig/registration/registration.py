@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surfsig.digits import position_text
 from surfsig.point_cloud import PointCloud, coordinate_array
 from surfsig.recurrences.free_directions import FreeDirection
 from surfsig.registration.motion import moved
@@ -107,13 +108,13 @@ class Registration:
             for line, row in enumerate(self.T_target_source)
         ]
         deviations = np.sqrt(np.diag(self.covariance))
-        turns, shifts, center = (
+        turns, shifts = (
             ", ".join(f"{value:.6g}" for value in values)
-            for values in (np.degrees(deviations[:3]), deviations[3:], self.center)
+            for values in (np.degrees(deviations[:3]), deviations[3:])
         )
         rows += [
             ("standard deviation", f"{turns} degrees about x, y, z"),
-            ("", f"{shifts} along them, at {center}"),
+            ("", f"{shifts} along them, at {position_text(self.center)}"),
             ("overlap", f"{self.overlap:.0%} of the source, rms {self.rms:.6g}"),
         ]
         if self.matches:

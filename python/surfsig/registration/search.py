@@ -36,6 +36,8 @@ _PLACES = 6000
 """Places of the source that the last steps look at."""
 _FEWEST = 50
 """Points without which there is nothing to register."""
+_FEWEST_VOXELS = 16
+"""Voxels of each scan without which there are no distributions to refine by."""
 _SURE, _OVERLAPPING = 24, 0.04
 """Matches that agree, and overlap, from which on a pose is trusted."""
 _STARTED_OVERLAP = 0.3
@@ -131,6 +133,8 @@ def _registered(
         pose = agreed_pose(pairs)
     voxel = size / _VOXELS
     refiner = Refiner(ours.offsets, theirs.offsets, voxel)
+    if min(refiner.source_voxels, refiner.target_voxels) < _FEWEST_VOXELS:
+        return _nothing(size, 0 if pairs is None else len(pairs))
     pose = refiner.refined(pose)
     places = spread(ours.offsets, min(refiner.source_voxels, _PLACES), threads)
     surface = Surface(spread(theirs.offsets, refiner.target_voxels, threads), voxel, threads)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
 from surfsig.arguments import positive_length
 from surfsig.clean import COORDINATE_LIMIT
+from surfsig.digits import position_text
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud, position_array
 from surfsig.shapes.fitted import FittedShape, fitted_shape
 from surfsig.shapes.growth import grown
 from surfsig.shapes.robust import Kind, settled
+
+Array = NDArray[np.float64]
 
 __all__ = ["FittedShape", "fit_cylinder", "fit_plane", "fit_sphere"]
 
@@ -137,7 +140,9 @@ def _fit(
         found = settled(kind, points, robust=robust)
     else:
         start = None if radius is None else positive_length(radius, "radius")
-        found = grown(kind, points, position_array(place, "near") - cloud.origin, start)
+        position = position_array(place, "near")
+        _check_near(points, position - cloud.origin, start, position)
+        found = grown(kind, points, position - cloud.origin, start)
     if found is None:
         where = "" if place is None else " near that place"
         raise InvalidInputError(f"the points{where} determine no {kind}")
@@ -145,3 +150,18 @@ def _fit(
     inliers = np.zeros(len(cloud), np.bool_)
     inliers[np.flatnonzero(finite)[chosen]] = True
     return fitted_shape(kind, surface, cloud, inliers)
+
+
+def _check_near(points: Array, place: Array, radius: float | None, given: Array) -> None:
+    """Refuse a position that is farther from all points than a surface of them could reach."""
+    nearest = float(np.linalg.norm(points - place, axis=1).min())
+    extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+    if nearest > extent:
+        raise InvalidInputError(
+            f"near is {nearest:.4g} from the nearest point, farther than the cloud's extent of {extent:.4g}: "
+            f"no surface reaches {position_text(given)}"
+        )
+    if radius is not None and nearest > radius:
+        raise InvalidInputError(
+            f"no point is within the radius {radius:.4g} of near: the nearest is {nearest:.4g} away"
+        )

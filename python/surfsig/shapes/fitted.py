@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from surfsig import _surfsig
 from surfsig.defaults import INTERVAL
+from surfsig.digits import with_error
 from surfsig.point_cloud import PointCloud
 from surfsig.shapes.robust import Array, Kind
 
@@ -64,7 +65,7 @@ class FittedShape:
         return self.radius - half, self.radius + half
 
     def __repr__(self) -> str:
-        size = "" if self.kind == "plane" else f", radius={self.radius:.6g} +- {self.radius_std:.2g}"
+        size = "" if self.kind == "plane" else f", radius={with_error(self.radius, self.radius_std)}"
         return (
             f"FittedShape({self.kind}{size}, rms={self.rms:.3g}, {self.count} of {len(self.inliers)} points)"
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from surfsig.digits import decimals_of
 from surfsig.surfaces.surface import Surface
 
 HEADER = ("", "kind", "radius", "95 % interval", "size", "area", "points", "rms")
@@ -33,9 +34,7 @@ def _radius(surface: Surface) -> tuple[str, str]:
     low, high = surface.interval
     if not high > low:
         return f"{surface.radius:.5g}", ""
-    decimals = max(0, 1 - math.floor(math.log10(0.5 * (high - low))))
-    # Beyond float64's digits there is nothing to show.
-    decimals = min(decimals, max(0, 14 - math.floor(math.log10(abs(surface.radius)))))
+    decimals = decimals_of(surface.radius, 0.5 * (high - low))
     return f"{surface.radius:.{decimals}f}", f"{low:.{decimals}f} to {high:.{decimals}f}"
 
 
