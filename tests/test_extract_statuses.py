@@ -269,7 +269,7 @@ def test_the_status_numbers_are_those_of_the_core() -> None:
     from surfsig import _surfsig
 
     assert [status.name.lower() for status in Status] == _surfsig.STATUS_NAMES
-    assert [int(status) for status in Status] == list(range(7))
+    assert [int(status) for status in Status] == list(range(8))
 
 
 def test_an_edge_does_not_settle_and_keeps_its_last_values() -> None:

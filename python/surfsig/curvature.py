@@ -202,7 +202,8 @@ class _Job:
             progress=self.progress,
         )
         sizes = radius if isinstance(radius, Sequence) and not isinstance(radius, str) else [radius]
-        too_coarse = max(int((arrays["status"] == Status.TOO_COARSE).sum()) for arrays in found)
+        counts = [int((arrays["status"] == Status.TOO_COARSE).sum()) for arrays in found]
+        too_coarse = max(counts, default=0)
         if too_coarse:
             warnings.warn(
                 f"{step_text(cloud)}, too coarse for the radius: {too_coarse} of "

@@ -39,6 +39,14 @@ def missing_returns_text(missing: int, points: int) -> str:
     return f"{missing} of {points} points are at (0, 0, 0), where a lidar's missing returns are written"
 
 
+def warn_of_missing_returns(cloud: PointCloud, name: str) -> None:
+    """Warn where points of a cloud are missing returns."""
+    missing = int(missing_returns(cloud).sum())
+    if missing:
+        told = missing_returns_text(missing, len(cloud))
+        warnings.warn(f"{name}: {told}; remove_missing_returns (clean --no-returns) drops them", stacklevel=3)
+
+
 def without_missing_returns(cloud: PointCloud, name: str) -> PointCloud:
     """Drop missing returns as `remove_missing_returns` does; a warning calls the cloud by its name."""
     kept = remove_missing_returns(cloud)

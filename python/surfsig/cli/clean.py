@@ -15,6 +15,7 @@ from surfsig.cli.options import CLOUD, input_options, json_option, quiet_option,
 @click.command("clean", no_args_is_help=True)
 @click.argument("file", type=CLOUD)
 @click.argument("output", type=CLOUD)
+@click.option("--no-returns", is_flag=True, help="Drop a lidar's missing returns, which are at (0, 0, 0).")
 @click.option("--outliers", is_flag=True, help="Drop points that are far from their neighbours.")
 @click.option(
     "--neighbors",
@@ -38,6 +39,7 @@ from surfsig.cli.options import CLOUD, input_options, json_option, quiet_option,
 def clean_command(
     file: Path,
     output: Path,
+    no_returns: bool,
     outliers: bool,
     neighbors: int,
     std_ratio: float,
@@ -49,23 +51,28 @@ def clean_command(
 ) -> None:
     """Write the points of FILE to OUTPUT, cleaned: those in --box, then without outliers, then one per voxel.
 
-    Points that are not finite are dropped by each of these steps. Fields go with their points.
+    Points that are not finite are dropped by each of these steps, and missing returns by --outliers, too.
+    Fields go with their points.
 
     \b
     Examples:
       surfsig clean scan.ply out.ply --outliers
+      surfsig clean lidar.pcd out.pcd --no-returns
       surfsig clean scan.pcd out.ply --box 0,0,0.5,1,1,2 --outliers --std-ratio 1 --voxel 0.002
     """  # noqa: D301
     import surfsig
     from surfsig.files import check_writable
 
-    if reading["box"] is None and not outliers and voxel is None:
-        raise click.UsageError("nothing to do: give --box, --outliers or --voxel")
+    if reading["box"] is None and not no_returns and not outliers and voxel is None:
+        raise click.UsageError("nothing to do: give --box, --no-returns, --outliers or --voxel")
     check_writable(output)
     shown = on_terminal() and not quiet
     with progress_bar("reading", "bytes", shown=shown) as progress:
         cloud = surfsig.read(file, progress=progress, **reading)
     points = {"read": len(cloud)}
+    if no_returns:
+        cloud = surfsig.remove_missing_returns(cloud)
+        points["not_missing_returns"] = len(cloud)
     if outliers:
         cloud = surfsig.remove_outliers(cloud, neighbors, std_ratio, threads=threads)
         points["not_outliers"] = len(cloud)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,9 +75,10 @@ def compare_command(
     places: list[dict[str, Any]] = []
     found: list[Extraction] = []
     clouds: dict[Path, PointCloud] = {}
-    for file, spot in zip((a, b), at, strict=True):
+    for file in (a, b):
         if file not in clouds:
             clouds[file] = surfsig.read(file, **reading)
+    for file, spot in zip((a, b), at, strict=True):
         result = surfsig.extract(
             clouds[file], radius, axes=axes, at=[spot], viewpoint=viewpoint, threads=threads
         )
@@ -86,7 +88,9 @@ def compare_command(
         if not np.isfinite(rows).all():
             where = position_text(spot, ",")
             why = f"{status.replace('_', ' ')} ({int(result.count[0])} points within {number(radius)})"
-            raise surfsig.InvalidInputError(f"{file}: no signature at {where}: {why}")
+            hint = _hint(a, b, clouds)
+            text = f"{file}: no signature at {where}: {why}"
+            raise surfsig.InvalidInputError(text if hint is None else f"{text}; {hint}")
         place: dict[str, Any] = {"file": str(file), "at": spot, "status": status}
         place |= {"count": int(result.count[0])}
         place |= {name: float(getattr(result, name)[0]) for name in ("k1", "k2", "residual")}
@@ -95,6 +99,9 @@ def compare_command(
     rows = np.vstack([result.signatures(flat_atom=flat) for result in found])
     either_side = axes == "surface" and not all(result.oriented for result in found)
     zeta = float(surfsig.similarity(rows[0], rows[1], either_side=either_side))
+    hint = _hint(a, b, clouds) if surfsig.similarity_class(zeta) == "dissimilar" else None
+    if hint is not None:
+        warnings.warn(hint, stacklevel=1)
     values = {"a": places[0], "b": places[1], "radius": radius, "axes": axes, "flat_atom": flat}
     values |= {"zeta": zeta, "class": surfsig.similarity_class(zeta)}
     if as_json:
@@ -108,3 +115,10 @@ def compare_command(
             ("", f"{curvature}, from {place['count']:,} points, residual {number(place['residual'])}")
         )
     print_table(f"radius {number(radius)}, {axes} axes", table, err=False)
+
+
+def _hint(a: Path, b: Path, clouds: dict[Path, PointCloud]) -> str | None:
+    """Say whether the two files seem to be in different units."""
+    import surfsig
+
+    return None if a == b else surfsig.unit_mismatch(clouds[a], clouds[b], (str(a), str(b)))

@@ -121,6 +121,7 @@ def extract_command(
 
     import surfsig
     from surfsig.files import check_writable, write
+    from surfsig.missing_returns import warn_of_missing_returns
 
     if at and voxel is not None:
         raise click.UsageError("--at and --voxel exclude each other")
@@ -130,6 +131,7 @@ def extract_command(
     clock = [time.perf_counter()]
     with progress_bar("reading", "bytes", shown=shown) as progress:
         cloud = surfsig.read(file, progress=progress, **reading)
+    warn_of_missing_returns(cloud, str(file))
     clock.append(time.perf_counter())
     with progress_bar("extracting", "points", shown=shown) as progress:
         extract = partial(

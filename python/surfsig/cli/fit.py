@@ -56,8 +56,10 @@ def _shape_command(name: str, fit: str, text: str) -> click.Command:
         **reading: Any,
     ) -> None:
         import surfsig
+        from surfsig.missing_returns import warn_of_missing_returns
 
         cloud = surfsig.read(file, **reading)
+        warn_of_missing_returns(cloud, str(file))
         try:
             shape = getattr(surfsig, fit)(cloud, near=near, radius=radius, robust=robust)
         except surfsig.InvalidInputError as error:

@@ -77,11 +77,13 @@ def surfaces_command(
       surfsig surfaces part.ply --unit mm --kinds plane,cylinder --json - | jq '.surfaces[].radius'
     """  # noqa: D301
     import surfsig
+    from surfsig.missing_returns import warn_of_missing_returns
 
     on_stdout = check_results(output, json_file, report)
     shown = on_terminal() and not quiet
     with progress_bar("reading", "bytes", shown=shown) as progress:
         cloud = surfsig.read(file, progress=progress, **reading)
+    warn_of_missing_returns(cloud, str(file))
     with progress_bar("finding surfaces", "points", shown=shown) as progress:
         found = surfsig.surfaces(
             cloud,

@@ -119,12 +119,12 @@ def find(
     least = _score(score)
     threads = thread_count(threads)
     cloud = PointCloud.of(scene)
-    missing = int(missing_returns(cloud).sum())
-    if missing:
-        told = missing_returns_text(missing, len(cloud))
+    missing = missing_returns(cloud)
+    if missing.any():
+        told = missing_returns_text(int(missing.sum()), len(cloud))
         warnings.warn(f"the scene: {told}; they are left out", stacklevel=2)
     models = _models(model, threads)
-    if int(cloud.finite.sum()) < FEWEST or not models:
+    if int((cloud.finite & ~missing).sum()) < FEWEST or not models:
         return Instances([], cloud, {})
     candidates: list[_Candidate] = []
     warn_if_too_coarse(cloud, max(part.radius for part in models.values()), "the scene: patches")
