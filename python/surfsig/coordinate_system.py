@@ -28,7 +28,13 @@ _UNITS_BY_CODE = {
     9001: "metre", 9002: "foot", 9003: "US survey foot", 9101: "radian", 9102: "degree", 9105: "grad",
 }  # fmt: skip
 # Codes of UTM zones, all of them in metres: WGS 84 north and south, ETRS89, NAD83, NAD27.
-_UTM = (range(32601, 32661), range(32701, 32761), range(25828, 25839), range(26901, 26924), range(26701, 26723))
+_UTM = (
+    range(32601, 32661),
+    range(32701, 32761),
+    range(25828, 25839),
+    range(26901, 26924),
+    range(26701, 26723),
+)
 
 _TEXT_MARK = "GeoTIFF:"
 
@@ -204,9 +210,7 @@ def _named(unit: tuple[str, float] | None, known: dict[str, float]) -> str | Non
     if unit is None:
         return None
     name, size = unit
-    return next(
-        (usual for usual, other in known.items() if abs(size - other) <= SAME_UNIT * other), name
-    )
+    return next((usual for usual, other in known.items() if abs(size - other) <= SAME_UNIT * other), name)
 
 
 def _defined(code: int | None) -> int | None:

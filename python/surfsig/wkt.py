@@ -1,4 +1,4 @@
-"""Well-known text (WKT) of coordinate systems, versions 1 and 2: read as a tree, and what its axes measure."""
+"""Well-known text (WKT) of coordinate systems, versions 1 and 2: what their axes measure, and in what unit."""
 
 from __future__ import annotations
 
@@ -70,17 +70,15 @@ def describe(text: str) -> Described:
 
     The units are those of the system itself: a projected one has another system inside, in degrees.
     """
-    systems = [part for root in _roots(text) for part in _parts(root)]
     roots = [_unwrapped(root) for root in _roots(text)]
+    systems = [part for root in roots for part in _parts(root)]
     level = next((system for system in systems if system.keyword in _HORIZONTAL), None)
     height = next((system for system in systems if system.keyword in _VERTICAL), None)
     name = roots[0].words[0] if roots and roots[0].words else None
-    horizontal = None if level is None else _unit(level, 0)
-    if height is not None:
-        vertical = _unit(height, 0)
-    else:
-        vertical = None if level is None else _unit(level, 2)
-    return Described(name, level is not None and _is_geographic(level), horizontal, vertical)
+    if level is None:
+        return Described(name, False, None, None if height is None else _unit(height, 0))
+    vertical = _unit(level, 2) if height is None else _unit(height, 0)
+    return Described(name, _is_geographic(level), _unit(level, 0), vertical)
 
 
 def _is_geographic(system: Node) -> bool:
@@ -111,9 +109,8 @@ def _unit(system: Node, axis: int) -> tuple[str, float] | None:
     return None
 
 
-def _parts(root: Node) -> list[Node]:
+def _parts(system: Node) -> list[Node]:
     """Give the systems that a compound one is made of; any other is itself its only part."""
-    system = _unwrapped(root)
     if system.keyword in ("COMPD_CS", "COMPOUNDCRS"):
         return [_unwrapped(node) for node in system.nodes]
     return [system]

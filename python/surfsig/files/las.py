@@ -15,7 +15,7 @@ from surfsig.errors import FileFormatError
 from surfsig.files.columns import blocks_of, with_colours
 from surfsig.files.las_counts import LARGEST_HEADER, Held, agreed_count, end_of_points
 from surfsig.files.las_header import RECORD_ID, USER_ID, check_coordinates, read_header
-from surfsig.files.laz_chunks import Chunk, PIECE_BYTES, copc_chunks, decoded, laz_chunks, one_line_errors
+from surfsig.files.laz_chunks import PIECE_BYTES, Chunk, copc_chunks, decoded, laz_chunks, one_line_errors
 from surfsig.files.options import inside
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud

@@ -96,10 +96,10 @@ def agreed_count(
 
 def end_of_points(head: bytes, start: int, size: int) -> int:
     """Say where the uncompressed points end at the latest: at the records or the waveforms behind them."""
-    behind = []
+    behind: list[int] = []
     if head[25] >= 3 and len(head) >= 235:
         behind += struct.unpack_from("<Q", head, 227)
     if head[25] >= 4 and len(head) >= 247:
         place, count = struct.unpack_from("<QI", head, 235)
         behind += [place] if count else []
-    return min([size, *(int(place) for place in behind if start < place)])
+    return min([size, *(place for place in behind if start < place)])

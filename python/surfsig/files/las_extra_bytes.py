@@ -59,7 +59,9 @@ def describe_extra_bytes(point_format: PointFormat, records: Sequence[bytes], so
         # Behind one of unknown length, or that ends outside the points, nobody knows where the next is.
         lost = lost or length is None or length > room
         if length == 0:
-            raise FileFormatError(f"{source}: cut off or broken: its records describe a dimension '{name}' of 0 bytes")
+            raise FileFormatError(
+                f"{source}: cut off or broken: its records describe a dimension '{name}' of 0 bytes"
+            )
         if lost or length is None:
             left_out.append(name)
             continue

@@ -90,9 +90,7 @@ def read_header(
     with one_line_errors(source):
         header = LasHeader.read_from(io.BytesIO(content))
     header.point_count = promised[0]
-    described = [
-        record.data for record in records if (record.user_id, record.record_id) == EXTRA_BYTES
-    ]
+    described = [record.data for record in records if (record.user_id, record.record_id) == EXTRA_BYTES]
     with one_line_errors(source):
         describe_extra_bytes(header.point_format, described, source)
         # A description may be read and still make no type.

@@ -171,7 +171,7 @@ def _write(
 
 
 def _add_coordinate_system(header: laspy.LasHeader, system: CoordinateSystem) -> None:
-    """Add the records of a coordinate system: WKT, or the GeoTIFF keys where they cannot be turned into it."""
+    """Add the records of a coordinate system: WKT, or GeoTIFF keys that cannot be turned into it."""
     user_id, wkt, keys = PROJECTION.decode(), system.to_wkt(), system.geo_keys
     if wkt is not None:
         records = {WKT: wkt.encode() + b"\0"}

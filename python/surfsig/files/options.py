@@ -97,16 +97,23 @@ def check_unit(system: CoordinateSystem | None, unit: str | None, source: str) -
             f"{source}: its numbers were taken for {unit}, but its coordinate system says {system.unit}",
             stacklevel=3,
         )
-    if not system.is_geographic and None not in (system.unit, system.vertical_unit):
-        if system.unit != system.vertical_unit:
-            warnings.warn(
-                f"{source}: its x and y are in the unit {system.unit}, its z in the unit "
-                f"{system.vertical_unit}: shapes and curvature are distorted; bring them to one unit first",
-                stacklevel=3,
-            )
+    two = system.vertical_unit not in (None, system.unit)
+    if two and not system.is_geographic and system.unit is not None:
+        warnings.warn(
+            f"{source}: its x and y are in the unit {system.unit}, its z in the unit "
+            f"{system.vertical_unit}: shapes and curvature are distorted; bring them to one unit first",
+            stacklevel=3,
+        )
 
 
 def unit_of(system: CoordinateSystem) -> str | None:
     """Give the name in `UNITS` of a system's horizontal unit; None if it has none there."""
     size = system.metres_per_unit
-    return next((unit for unit, metres in UNITS.items() if size is not None and abs(size - metres) <= SAME_UNIT * metres), None)
+    return next(
+        (
+            unit
+            for unit, metres in UNITS.items()
+            if size is not None and abs(size - metres) <= SAME_UNIT * metres
+        ),
+        None,
+    )

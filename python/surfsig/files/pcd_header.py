@@ -57,6 +57,8 @@ class Header:
         Number of lines, DATA included.
     notes
         What this library wrote as comments.
+    says_width
+        There is a line WIDTH; without it the number of points is that of POINTS.
     """
 
     names: list[str]
@@ -68,6 +70,7 @@ class Header:
     data: str
     lines: int = 0
     notes: dict[str, str] = field(default_factory=dict)
+    says_width: bool = True
 
     @property
     def points(self) -> int:
@@ -159,6 +162,7 @@ def _header(entries: dict[str, list[str]], source: str) -> Header:
         width,
         _viewpoint(entries.get("VIEWPOINT"), source),
         data,
+        says_width="WIDTH" in entries,
     )
 
 
@@ -214,9 +218,10 @@ def _viewpoint(words: list[str] | None, source: str) -> list[float] | None:
 def check_size(needed: int, size: int, header: Header, source: str) -> None:
     """Refuse a file of `size` bytes of data that should have so many more."""
     if needed > size:
+        counted = "" if header.says_width else " (it has no line WIDTH)"
         raise FileFormatError(
-            f"{source}: cut off: its header promises {header.points} points and so at least {needed} bytes "
-            f"of data, {size} are there"
+            f"{source}: cut off: its header promises {header.points} points{counted} and so at least "
+            f"{needed} bytes of data, {size} are there"
         )
 
 
