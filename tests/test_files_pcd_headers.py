@@ -313,9 +313,12 @@ def test_an_origin_that_makes_no_sense(tmp_path: Path, words: str) -> None:
 
 
 def test_an_origin_without_doubles_is_added(tmp_path: Path) -> None:
-    content = header().replace(b"FIELDS", b"# surfsig origin 1e6 2e6 3\n# surfsig viewpoint 5 6 7\nFIELDS")
-    (tmp_path / "a.pcd").write_bytes(content + points().tobytes())
-    cloud = read(tmp_path / "a.pcd")
-    np.testing.assert_array_equal(cloud.points, points() + np.array([1e6, 2e6, 3]))
-    assert cloud.viewpoint is not None
-    assert cloud.viewpoint.tolist() == [5, 6, 7]
+    content = header(VIEWPOINT="1 2 3 1 0 0 0").replace(b"FIELDS", b"# surfsig origin 1e6 2e6 3\nFIELDS")
+    viewpoint = b"# surfsig viewpoint 5 6 7\nFIELDS"
+    expected = {b"FIELDS": [1e6 + 1, 2e6 + 2, 6], viewpoint: [5, 6, 7]}
+    for line, place in expected.items():
+        (tmp_path / "a.pcd").write_bytes(content.replace(b"FIELDS", line) + points().tobytes())
+        cloud = read(tmp_path / "a.pcd")
+        np.testing.assert_array_equal(cloud.points, points() + np.array([1e6, 2e6, 3]))
+        assert cloud.viewpoint is not None
+        assert cloud.viewpoint.tolist() == place

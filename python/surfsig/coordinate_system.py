@@ -120,7 +120,17 @@ class CoordinateSystem:
 
     @classmethod
     def from_wkt(cls, text: str) -> CoordinateSystem:
-        """Take a system from well-known text, version 1 or 2; what is broken has no name and no unit."""
+        """Take a system from well-known text, version 1 or 2.
+
+        Parameters
+        ----------
+        text
+            The text; a broken one has no name and no unit.
+
+        Returns
+        -------
+        CoordinateSystem
+        """
         told = describe(text)
         angles = told.is_geographic
         unit = _named(told.horizontal, _ANGLES if angles else _LENGTHS)
@@ -134,6 +144,15 @@ class CoordinateSystem:
 
         The unit that belongs to the number of a system and is not said beside it is known for UTM, and for
         all others where pyproj is installed.
+
+        Parameters
+        ----------
+        keys
+            The records of a file.
+
+        Returns
+        -------
+        CoordinateSystem
         """
         numbers = keys.numbers()
         code = _code(numbers)
@@ -165,7 +184,18 @@ class CoordinateSystem:
 
     @classmethod
     def from_text(cls, text: str) -> CoordinateSystem | None:
-        """Take a system from what `to_text` wrote, or from well-known text; None if it is neither."""
+        """Take a system from a line of text.
+
+        Parameters
+        ----------
+        text
+            What `to_text` wrote, or well-known text.
+
+        Returns
+        -------
+        CoordinateSystem or None
+            None if it is neither.
+        """
         if not text.startswith(_TEXT_MARK):
             found = cls.from_wkt(text)
             return found if found.name is not None else None
@@ -178,7 +208,12 @@ class CoordinateSystem:
         return cls.from_geo_keys(GeoKeys(*parts)) if len(parts) == 3 else None
 
     def to_text(self) -> str:
-        """Write the system in a line: its WKT, or the GeoTIFF keys in base64."""
+        """Write the system in a line, for the comments of other formats.
+
+        Returns
+        -------
+        The WKT, or the GeoTIFF keys in base64.
+        """
         if self.wkt is not None:
             return " ".join(self.wkt.split())
         keys = self.geo_keys or GeoKeys(b"")

@@ -1,4 +1,4 @@
-"""Well-known text (WKT) of coordinate systems, versions 1 and 2: what their axes measure, and in what unit."""
+"""Well-known text (WKT) of coordinate systems, versions 1 and 2: what the axes measure, and in which unit."""
 
 from __future__ import annotations
 

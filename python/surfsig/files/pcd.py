@@ -54,25 +54,25 @@ def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
         kind for name, kind in zip(header.names, header.types, strict=True) if name.lower() in ("x", "y", "z")
     }
     origin = _numbers(header.notes.get("origin"), source)
-    exact = with_exact(columns, origin, source)
+    viewpoint = header.viewpoint
+    if origin is not None:
+        told = _numbers(header.notes.get("viewpoint"), source)
+        viewpoint = told if told is not None or viewpoint is None else origin + viewpoint
+    exact = _with_exact(columns, origin, source)
     cloud = cloud_from_columns(
         exact or columns,
         source=source,
-        viewpoint=header.viewpoint,
+        viewpoint=viewpoint,
         grid=(header.height, header.width) if header.height > 1 else None,
         declared_float32=header.data == "ascii" and axes == {"f4"},
     )
-    if origin is not None:
-        cloud = replace(
-            cloud,
-            origin=cloud.origin if exact else origin,
-            viewpoint=_numbers(header.notes.get("viewpoint"), source),
-        )
+    if origin is not None and not exact:
+        cloud = replace(cloud, origin=origin)
     system = CoordinateSystem.from_text(header.notes.get("coordinate_system", ""))
     return cloud if system is None else replace(cloud, coordinate_system=system)
 
 
-def with_exact(
+def _with_exact(
     columns: dict[str, NDArray[Any]], origin: NDArray[np.float64] | None, source: str
 ) -> dict[str, NDArray[Any]] | None:
     """Put the coordinates that stand beside x, y and z as doubles in their place.

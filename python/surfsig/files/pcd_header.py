@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
 from surfsig.files.columns import unique_name
@@ -66,7 +67,7 @@ class Header:
     counts: list[int]
     height: int
     width: int
-    viewpoint: list[float] | None
+    viewpoint: NDArray[np.float64] | None
     data: str
     lines: int = 0
     notes: dict[str, str] = field(default_factory=dict)
@@ -203,7 +204,7 @@ def _unique(names: list[str], source: str) -> list[str]:
     return unique
 
 
-def _viewpoint(words: list[str] | None, source: str) -> list[float] | None:
+def _viewpoint(words: list[str] | None, source: str) -> NDArray[np.float64] | None:
     """Give the position: three numbers, before an orientation as a quaternion, which does not matter here."""
     if words is None:
         return None
@@ -211,7 +212,7 @@ def _viewpoint(words: list[str] | None, source: str) -> list[float] | None:
     if len(numbers) != 7:
         told = "its first three were taken for the position" if len(numbers) >= 3 else "it is left out"
         warnings.warn(f"{source}: VIEWPOINT has {len(numbers)} numbers, not seven; {told}", stacklevel=6)
-    position = numbers[:3]
+    position = np.array(numbers[:3])
     return position if len(position) == 3 and bool(np.isfinite(position).all()) else None
 
 
