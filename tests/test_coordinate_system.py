@@ -268,6 +268,15 @@ def test_the_bit_of_the_header_says_which_system_counts(tmp_path: Path) -> None:
         assert system.unit == unit
 
 
+def test_text_that_is_broken_beside_keys_that_are_not(tmp_path: Path) -> None:
+    broken = projection(WKT_RECORD, b"PROJCS[")
+    for records, name in (([broken, *key_records()], "NAD83 / UTM zone 18N"), ([broken], None)):
+        (tmp_path / "a.las").write_bytes(las_with(*records, point_format=6, version="1.4", wkt=True))
+        system = read_quietly(tmp_path / "a.las").coordinate_system
+        assert system is not None
+        assert system.name == name
+
+
 def test_geotiff_keys_become_wkt(tmp_path: Path) -> None:
     pyproj = pytest.importorskip("pyproj")
     (tmp_path / "in.las").write_bytes(las_with(*key_records()))

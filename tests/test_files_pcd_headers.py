@@ -146,6 +146,8 @@ def test_columns_for_fields(tmp_path: Path, key: str) -> None:
         ({"WIDTH": None, "HEIGHT": "2"}, (2, 5)),
         ({"HEIGHT": None, "WIDTH": "5"}, (2, 5)),
         ({"HEIGHT": "2", "WIDTH": "5", "POINTS": None}, (2, 5)),
+        ({"WIDTH": "0", "HEIGHT": "0"}, None),
+        ({"WIDTH": "0"}, None),
         ({"COUNT": None, "VIEWPOINT": None}, None),
     ],
 )
@@ -166,6 +168,7 @@ def test_text_needs_no_types(tmp_path: Path) -> None:
     ("changes", "message"),
     [
         ({"WIDTH": None, "HEIGHT": None, "POINTS": None}, "has no line WIDTH"),
+        ({"POINTS": "0"}, "POINTS 0 is not WIDTH 10 times HEIGHT 1"),
         ({"POINTS": "9"}, "POINTS 9 is not WIDTH 10 times HEIGHT 1"),
         ({"WIDTH": None, "HEIGHT": "3"}, "POINTS 10 is not WIDTH 3 times HEIGHT 3"),
         ({"HEIGHT": None, "WIDTH": "4"}, "POINTS 10 is not WIDTH 4 times HEIGHT 2"),

@@ -161,6 +161,17 @@ def test_coordinates_that_another_program_has_moved_are_believed(tmp_path: Path)
     assert np.abs(cloud.points).max() < 20
 
 
+def test_notes_with_the_names_of_the_writer_s_own(tmp_path: Path) -> None:
+    notes = {"origin": "a lidar", "viewpoint": "above", "coordinate_system": "of the robot", "radius": "1"}
+    write(tmp_path / "a.pcd", PointCloud(np.eye(3)), notes=notes)
+    head = split(tmp_path / "a.pcd")[0]
+    assert "# surfsig note_origin a lidar\n# surfsig note_viewpoint above\n" in head
+    assert "# surfsig radius 1\n" in head
+    cloud = read(tmp_path / "a.pcd")
+    np.testing.assert_array_equal(cloud.points, np.eye(3))
+    assert cloud.viewpoint is None
+
+
 def test_points_that_are_not_finite_do_not_choose_the_origin(tmp_path: Path) -> None:
     points = np.array([500_123.4, 4_501_234.5, 98.7]) + RNG.uniform(-10, 10, (50, 3))
     points[3], points[7, 1] = np.nan, np.inf

@@ -172,7 +172,9 @@ def _coordinate_system(
     text = found.get(WKT, b"").partition(b"\0")[0].decode("utf-8", errors="replace").strip()
     keys = GeoKeys(found.get(GEO_KEYS, b""), found.get(GEO_DOUBLES, b""), found.get(GEO_TEXT, b""))
     if text and (header.global_encoding.wkt or keys.is_empty):
-        return CoordinateSystem.from_wkt(text)
+        system = CoordinateSystem.from_wkt(text)
+        if system.name is not None or keys.is_empty:
+            return system
     return None if keys.is_empty else CoordinateSystem.from_geo_keys(keys)
 
 

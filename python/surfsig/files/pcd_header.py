@@ -24,6 +24,8 @@ MAX_NUMBERS = 1 << 16
 
 NOTE = "# surfsig "
 """How a comment of this library begins; a key and its value follow."""
+OWN_NOTES = ("origin", "viewpoint", "coordinate_system")
+"""Keys that the reader looks for: what x, y and z are about, the viewpoint then, the coordinate system."""
 
 # PCL keeps a colour in one number of any type, blue first.
 PACKED_COLOURS = {
@@ -168,14 +170,19 @@ def _header(entries: dict[str, list[str]], source: str) -> Header:
 
 
 def _grid(entries: dict[str, list[str]]) -> tuple[int, int]:
-    """Give height and width of the cloud, one of which, or the number of points, may not be said."""
-    said = {}
-    for key in ("WIDTH", "HEIGHT", "POINTS"):
+    """Give height and width of the cloud, one of which, or the number of points, may not be said.
+
+    A WIDTH or HEIGHT of 0 beside points says nothing, as in PCL.
+    """
+    said: dict[str, int] = {}
+    for key in ("POINTS", "WIDTH", "HEIGHT"):
         if key in entries:
-            (number,) = entries[key]
-            said[key] = int(number)
-            if said[key] < 0:
+            (word,) = entries[key]
+            number = int(word)
+            if number < 0:
                 raise ValueError(f"a negative {key}")
+            if number or not said.get("POINTS"):
+                said[key] = number
     if "WIDTH" not in said and "POINTS" not in said:
         raise KeyError("WIDTH")
     height = said.get("HEIGHT", 1)

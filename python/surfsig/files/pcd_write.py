@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.files.columns import Chunks, blocks_of, exact_float32, header_word, unique_name
-from surfsig.files.pcd_header import EXACT, NOTE, PACKED_COLOURS
+from surfsig.files.pcd_header import EXACT, NOTE, OWN_NOTES, PACKED_COLOURS
 from surfsig.files.progress import Progress
 from surfsig.files.rows import write_rows
 from surfsig.point_cloud import PointCloud
@@ -64,6 +64,8 @@ def write(
         If x, y and z are written about an origin.
     """
     points = cloud.points
+    # A note that the reader would take for one of those below is called otherwise.
+    notes = {f"note_{key}" if key in OWN_NOTES else key: value for key, value in notes.items()}
     origin, exact = np.zeros(3), exact_float32(points)
     if not exact:
         origin = _origin(cloud)
@@ -74,11 +76,11 @@ def write(
             "which are too coarse so far from 0; surfsig adds it again, other programs do not",
             stacklevel=4,
         )
-        notes = {**notes, "origin": _words(origin)}
+        notes["origin"] = _words(origin)
         if cloud.viewpoint is not None:
             notes["viewpoint"] = _words(cloud.viewpoint)
     if cloud.coordinate_system is not None:
-        notes = {**notes, "coordinate_system": cloud.coordinate_system.to_text()}
+        notes["coordinate_system"] = cloud.coordinate_system.to_text()
     near = points
     if not exact:
         with np.errstate(over="ignore", invalid="ignore"):
