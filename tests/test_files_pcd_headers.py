@@ -175,6 +175,7 @@ def test_text_needs_no_types(tmp_path: Path) -> None:
         ({"WIDTH": "-10", "HEIGHT": "-1"}, "a negative WIDTH"),
         ({"COUNT": "1 1 -1"}, "a negative COUNT"),
         ({"COUNT": "1 1 0"}, "no column 'z'"),
+        ({"COUNT": "1 2 1", "WIDTH": "7", "POINTS": "7"}, "column 'y' holds 2 numbers per point, not one"),
         ({"POINTS": "ten"}, "makes no sense"),
         ({"VIEWPOINT": "a b c"}, "makes no sense"),
     ],
