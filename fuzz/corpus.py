@@ -22,6 +22,7 @@ import lzf
 import numpy as np
 
 import surfsig
+from surfsig.coordinate_system import CoordinateSystem
 from surfsig.files.formats import FORMATS
 from surfsig.point_cloud import PointCloud
 
@@ -106,6 +107,54 @@ def las(point_format: int, version: str, compressed: bool) -> bytes:
     return file.getvalue()
 
 
+def las_of_two_descriptions(compressed: bool) -> bytes:
+    """Return a file of point format 6 with its coordinate system as WKT and as GeoTIFF keys.
+
+    Two records describe its extra bytes, and another one behind the points repeats the WKT.
+    """
+    head, wkt = (
+        struct.Struct("<2x16sHQ32x"),
+        b'PROJCS["utm",GEOGCS["geo",UNIT["degree",0.01745]],UNIT["m",1]]\0',
+    )
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.add_extra_dim(laspy.ExtraBytesParams("first", "u2"))
+    second = laspy.LasHeader(point_format=6, version="1.4")
+    second.add_extra_dim(laspy.ExtraBytesParams("second", "i4", scales=[0.5], offsets=[1.0]))
+    described = second.vlrs[0].record_data_bytes()
+    header.add_extra_dim(laspy.ExtraBytesParams("second", "i4"))
+    record = header.vlrs[0]
+    record.extra_bytes_structs = record.extra_bytes_structs[:1]
+    keys = struct.pack("<12H", 1, 1, 0, 2, 1024, 0, 1, 1, 3073, 34737, 4, 0)
+    header.vlrs.extend(
+        [
+            laspy.VLR("LASF_Spec", 4, "", described),
+            laspy.VLR("LASF_Projection", 2112, "", wkt),
+            laspy.VLR("LASF_Projection", 34735, "", keys),
+            laspy.VLR("LASF_Projection", 34737, "", b"utm|\0"),
+        ]
+    )
+    data = laspy.LasData(header)
+    data.xyz = POINTS
+    file = io.BytesIO()
+    data.write(file, do_compress=compressed)
+    content = bytearray(file.getvalue())
+    struct.pack_into("<QI", content, 235, len(content), 1)
+    return bytes(content) + head.pack(b"LASF_Projection", 2112, len(wkt)) + wkt
+
+
+def pcd_of_others(data: str) -> bytes:
+    """Return a PCD file with a header that other programs write: names twice, a COUNT of 0, commas."""
+    head = (
+        b"# .PCD v.5\nversion .5\ncolumns x, y, z, i, none, i, rgb\nsize 4 4 4 4 8 4 4\ntype f f f f f f i\n"
+        b"count 1 1 1 1 0 1 1\nviewpoint 0 0 2 1\npoints 96\n# surfsig origin 1e5 2e6 3\ndata "
+    )
+    rows = np.column_stack([ROWS, ROWS[:, 3]])
+    if data == "ascii":
+        lines = (" ".join(f"{value:.6g}" for value in row) + " 4278850810\n" for row in rows)
+        return head + b"ascii\n" + "".join(lines).encode()
+    return head + b"binary\n" + np.column_stack([rows, rows[:, 0]]).astype("<f4").tobytes()
+
+
 def obj() -> bytes:
     """Return an OBJ mesh with colours, normals and faces that count from the end."""
     vertices = "".join(f"v {x:.6g} {y:.6g} {z:.6g} 0.5 0 1\n" for x, y, z in POINTS)
@@ -151,6 +200,8 @@ HAND_MADE: dict[str, tuple[Callable[[], bytes], dict[str, Any]]] = {
     "ascii.pcd": (lambda: pcd("ascii"), {}),
     "binary.pcd": (lambda: pcd("binary"), {}),
     "compressed.pcd": (lambda: pcd("binary_compressed"), {}),
+    "others ascii.pcd": (lambda: pcd_of_others("ascii"), {}),
+    "others binary.pcd": (lambda: pcd_of_others("binary"), {}),
     "space.xyz": (table, {}),
     "head.csv": (lambda: table(",", "x,y,z,intensity"), {}),
     "semicolon.txt": (lambda: table(";").replace(b".", b","), {}),
@@ -163,6 +214,8 @@ HAND_MADE: dict[str, tuple[Callable[[], bytes], dict[str, Any]]] = {
     "7.las": (lambda: las(7, "1.4", False), {}),
     "3.laz": (lambda: las(3, "1.2", True), {}),
     "8.laz": (lambda: las(8, "1.4", True), {"box": [[-1e9] * 3, [1e9] * 3]}),
+    "described.las": (lambda: las_of_two_descriptions(False), {}),
+    "described.laz": (lambda: las_of_two_descriptions(True), {}),
     "mesh.obj": (obj, {}),
     "sampled.obj": (obj, {"samples": 50}),
     "binary.stl": (stl_binary, {}),
@@ -180,9 +233,16 @@ def clouds() -> dict[str, PointCloud]:
         "wide": POINTS.astype(np.float64),
     }
     origin = np.array([4e5, 5e6, 100.0])
+    system = CoordinateSystem.from_wkt('PROJCS["utm",UNIT["metre",1]]')
     return {
         "bare": PointCloud(POINTS),
-        "far": PointCloud(POINTS.astype(np.float64), origin=origin, fields=fields, viewpoint=origin),
+        "far": PointCloud(
+            POINTS.astype(np.float64),
+            origin=origin,
+            fields=fields,
+            viewpoint=origin,
+            coordinate_system=system,
+        ),
         "grid": PointCloud(POINTS, grid=(8, 12), viewpoint=np.zeros(3)),
     }
 
@@ -194,7 +254,9 @@ def contents(also: Path | None) -> Iterator[tuple[str, bytes, dict[str, Any], bo
             for extension in kind.extensions if kind.write is not None else ():
                 for name, cloud in clouds().items():
                     path = Path(folder) / f"{name}{extension}"
-                    surfsig.write(path, cloud, {"scores": ROWS}, notes={"made": "for fuzzing"})
+                    with warnings.catch_warnings():
+                        warnings.simplefilter("ignore")
+                        surfsig.write(path, cloud, {"scores": ROWS}, notes={"made": "for fuzzing"})
                     yield path.name, path.read_bytes(), {}, True
     for name, (make, options) in HAND_MADE.items():
         yield name, make(), options, False

@@ -43,7 +43,12 @@ def assert_as_laspy_reads_it(path: Path) -> None:
 
 
 def test_shared_files_are_as_laspy_reads_them(shared_data: Path) -> None:
-    paths = [path for path in sorted(shared_data.rglob("*")) if path.suffix in (".las", ".laz")]
+    # What laspy refuses or reads otherwise is in a folder of its own.
+    paths = [
+        path
+        for path in sorted(shared_data.rglob("*"))
+        if path.suffix in (".las", ".laz") and "odd_files" not in path.parts
+    ]
     assert len(paths) >= 7
     for path in paths:
         assert_as_laspy_reads_it(path)

@@ -97,11 +97,87 @@ def test_names_that_mean_something_else_in_pcd(tmp_path: Path) -> None:
         write(tmp_path / "a.pcd", PointCloud(np.zeros((2, 3))), {"rgba": values})
 
 
-def test_coordinates_are_double_only_where_float_would_change_them(tmp_path: Path) -> None:
-    for points, size in ((np.array([[0.5, 2, 2.0**100]]), 4), (np.array([[500000.001, 0, 0]]), 8)):
+def rows_of(path: Path) -> NDArray[Any]:
+    """Give what a reader of floats finds as x, y, z, and the doubles behind them."""
+    head, body = split(path)
+    assert "FIELDS x y z x_double y_double z_double\nSIZE 4 4 4 8 8 8\n" in head
+    return np.frombuffer(body, [("xyz", "<f4", 3), ("exact", "<f8", 3)])
+
+
+def test_coordinates_stand_twice_only_where_float_would_change_them(tmp_path: Path) -> None:
+    points = np.array([[0.5, 2, 2.0**100]])
+    write(tmp_path / "a.pcd", PointCloud(points))
+    assert "FIELDS x y z\nSIZE 4 4 4\n" in split(tmp_path / "a.pcd")[0]
+    np.testing.assert_array_equal(read(tmp_path / "a.pcd").points, points)
+    points = RNG.normal(size=(500, 3)) + 3
+    write(tmp_path / "a.pcd", PointCloud(points))
+    rows = rows_of(tmp_path / "a.pcd")
+    np.testing.assert_array_equal(rows["xyz"], points.astype(np.float32))
+    np.testing.assert_array_equal(rows["exact"], points)
+    assert "origin" not in split(tmp_path / "a.pcd")[0]
+    again = read(tmp_path / "a.pcd")
+    assert again.fields == {}
+    np.testing.assert_array_equal(again.points, points)
+
+
+def test_utm_coordinates_are_floats_about_an_origin_that_is_told(tmp_path: Path) -> None:
+    # Readers of floats (PCL, Open3D) leave every point of a file of doubles at 0.
+    middle = np.array([500_123.4, 4_501_234.5, 98.7])
+    points = middle + RNG.uniform(-10, 10, (500, 3))
+    path = tmp_path / "a.pcd"
+    with pytest.warns(UserWarning, match="about the origin 500120, 4501230, 100, because"):
+        write(path, PointCloud(points, viewpoint=middle), {"h": np.arange(500)})
+    head, body = split(path)
+    assert "# surfsig origin 500120.0 4501230.0 100.0\n" in head
+    assert "SIZE 4 4 4 8 8 8 8\n" in head
+    rows = np.frombuffer(body, [("xyz", "<f4", 3), ("exact", "<f8", 3), ("h", "<i8")])
+    np.testing.assert_allclose(rows["xyz"] + [500_120.0, 4_501_230.0, 100.0], points, rtol=0, atol=1e-6)
+    numbers = [float(word) for word in head.partition("VIEWPOINT ")[2].split()[:3]]
+    np.testing.assert_allclose(numbers, [3.4, 4.5, -1.3], atol=1e-9)
+    again = read(path)
+    np.testing.assert_array_equal(again.points, points)
+    assert again.viewpoint is not None
+    np.testing.assert_array_equal(again.viewpoint, middle)
+    assert list(again.fields) == ["h"]
+
+
+def test_coordinates_that_another_program_has_moved_are_believed(tmp_path: Path) -> None:
+    points = np.array([500_123.4, 4_501_234.5, 98.7]) + RNG.uniform(-10, 10, (50, 3))
+    path = tmp_path / "a.pcd"
+    with pytest.warns(UserWarning, match="about the origin"):
+        write(path, PointCloud(points))
+    head, body = split(path)
+    rows = np.frombuffer(body, [("xyz", "<f4", 3), ("exact", "<f8", 3)]).copy()
+    rows["xyz"] += 1
+    path.write_bytes(head.encode() + rows.tobytes())
+    with pytest.warns(UserWarning, match="another program has changed them"):
+        cloud = read(path)
+    np.testing.assert_allclose(cloud.points, points + 1, rtol=0, atol=1e-5)
+    assert list(cloud.fields) == ["x_double", "y_double", "z_double"]
+    # Most programs drop comments: what is left is about the origin that nobody tells any more.
+    path.write_bytes(head.replace("# surfsig origin", "# was").encode() + body)
+    with pytest.warns(UserWarning, match="another program has changed them"):
+        cloud = read(path)
+    assert np.abs(cloud.points).max() < 20
+
+
+def test_notes_with_the_names_of_the_writer_s_own(tmp_path: Path) -> None:
+    notes = {"origin": "a lidar", "viewpoint": "above", "coordinate_system": "of the robot", "radius": "1"}
+    write(tmp_path / "a.pcd", PointCloud(np.eye(3)), notes=notes)
+    head = split(tmp_path / "a.pcd")[0]
+    assert "# surfsig note_origin a lidar\n# surfsig note_viewpoint above\n" in head
+    assert "# surfsig radius 1\n" in head
+    cloud = read(tmp_path / "a.pcd")
+    np.testing.assert_array_equal(cloud.points, np.eye(3))
+    assert cloud.viewpoint is None
+
+
+def test_points_that_are_not_finite_do_not_choose_the_origin(tmp_path: Path) -> None:
+    points = np.array([500_123.4, 4_501_234.5, 98.7]) + RNG.uniform(-10, 10, (50, 3))
+    points[3], points[7, 1] = np.nan, np.inf
+    with pytest.warns(UserWarning, match="about the origin 500120, 4501230, 100,"):
         write(tmp_path / "a.pcd", PointCloud(points))
-        assert f"SIZE {size} {size} {size}\n" in split(tmp_path / "a.pcd")[0]
-        np.testing.assert_array_equal(read(tmp_path / "a.pcd").points, points)
+    np.testing.assert_array_equal(read(tmp_path / "a.pcd").points, points)
 
 
 def test_a_viewpoint_that_nobody_knows_stays_unknown(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ found = surfsig.surfaces(cloud)            # planes, cylinders, spheres, ... and
 
 from surfsig._surfsig import INSTRUCTION_SET, Frame, __version__
 from surfsig.clean import crop, downsample, remove_outliers
+from surfsig.coordinate_system import CoordinateSystem
 from surfsig.curvature import extract, extract_radii
 from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
 from surfsig.extraction import Extraction, FitUsed, Status
@@ -44,6 +45,7 @@ from surfsig.units import unit_mismatch
 
 __all__ = [
     "INSTRUCTION_SET",
+    "CoordinateSystem",
     "Extraction",
     "FieldMatches",
     "FieldSignatures",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from surfsig.coordinate_system import CoordinateSystem
 from surfsig.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -83,6 +84,9 @@ class PointCloud:
         ``green``, ``blue`` (and ``alpha``), uint8.
     grid
         (height, width) of an organised cloud, whose points come row by row; None for any other.
+    coordinate_system
+        What the file said about the frame and the unit of the true coordinates; None where it said nothing,
+        and for clouds that were moved or scaled.
 
     Raises
     ------
@@ -96,6 +100,7 @@ class PointCloud:
     fields: dict[str, NDArray[Any]] = field(default_factory=dict)
     grid: tuple[int, int] | None = None
     viewpoints: NDArray[np.float64] | None = None
+    coordinate_system: CoordinateSystem | None = None
 
     def __post_init__(self) -> None:
         self.offsets = coordinate_array(self.offsets)

@@ -183,7 +183,7 @@ def _part_of(cloud: PointCloud, result: Extraction) -> PointCloud:
 
     if result.indices is not None:
         return cloud.at(result.indices)
-    return PointCloud(result.points, viewpoint=cloud.viewpoint)
+    return PointCloud(result.points, viewpoint=cloud.viewpoint, coordinate_system=cloud.coordinate_system)
 
 
 def _similarity_to(

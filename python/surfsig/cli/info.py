@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ def info_command(file: Path, as_json: bool, **reading: Any) -> None:
 
     with progress_bar("reading", "bytes", shown=on_terminal()) as progress:
         cloud = read(file, progress=progress, **reading)
+    _warn_of_feet(file, cloud)
     values = {"file": str(file), "format": format_name(file), **_describe(cloud)}
     if as_json:
         print_json(values)
@@ -48,12 +50,30 @@ def _describe(cloud: Any) -> dict[str, Any]:
         "minimum": points.min(axis=0) if len(points) else None,
         "maximum": points.max(axis=0) if len(points) else None,
         "viewpoint": cloud.viewpoint,
+        "coordinate_system": _system(cloud.coordinate_system),
         "spacing": median_spacing(points),
         "fields": {
             name: values.dtype.name + (f"[{values.shape[1]}]" if values.ndim == 2 else "")
             for name, values in cloud.fields.items()
         },
     }
+
+
+def _system(system: Any) -> dict[str, Any] | None:
+    names = ("name", "unit", "vertical_unit", "is_geographic")
+    return None if system is None else {name: getattr(system, name) for name in names}
+
+
+def _warn_of_feet(file: Path, cloud: Any) -> None:
+    from surfsig.files.options import unit_of
+
+    system = cloud.coordinate_system
+    unit = None if system is None else unit_of(system)
+    if unit in ("ft", "us-ft"):
+        warnings.warn(
+            f"{file}: its coordinates are in feet ({system.unit}); --unit {unit} reads it as metres",
+            stacklevel=2,
+        )
 
 
 def _rows(values: dict[str, Any]) -> list[tuple[str, str]]:
@@ -69,6 +89,14 @@ def _rows(values: dict[str, Any]) -> list[tuple[str, str]]:
             rows.append((axis, f"{low:.{digits}g} to {high:.{digits}g}"))
     seen_from = values["viewpoint"]
     rows.append(("viewpoint", "not known" if seen_from is None else ", ".join(number(v) for v in seen_from)))
+    system = values["coordinate_system"]
+    if system is None:
+        rows.append(("coordinate system", "not known"))
+    else:
+        units = [system["unit"] or "not known"]
+        if system["vertical_unit"] not in (None, system["unit"]):
+            units.append(f"z: {system['vertical_unit']}")
+        rows.append(("coordinate system", f"{system['name'] or 'without a name'}, unit: {', '.join(units)}"))
     spacing = values["spacing"]
     if spacing is not None:
         advice = f"a radius of 5 to 10 times that ({5 * spacing:.2g} to {10 * spacing:.2g}) is a start"

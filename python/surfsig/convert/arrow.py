@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfsig.convert.libraries import library
+from surfsig.coordinate_system import CoordinateSystem
 from surfsig.errors import InvalidInputError, SurfsigError
 from surfsig.files.columns import cloud_from_columns, output_columns
 from surfsig.point_cloud import PointCloud, position_array
@@ -29,7 +31,8 @@ def cloud_of(
     ----------
     data
         A table, a record batch, or an object with ``__arrow_c_stream__``. Columns of numbers, and of lists
-        of a fixed size, become fields; the viewpoint comes from the metadata that `table` writes.
+        of a fixed size, become fields; viewpoint, grid and coordinate system come from the metadata that
+        `table` writes.
     source
         What messages call it.
     error
@@ -55,9 +58,11 @@ def cloud_of(
         # Rows that were taken from a table keep the metadata of the whole.
         organised = (int(grid[0]), int(grid[1])) if grid and grid[0] * grid[1] == len(table) else None
         sensor = None if viewpoint is None else position_array(viewpoint, "viewpoint")
+        system = CoordinateSystem.from_text(notes.get("coordinate_system", ""))
     except (AttributeError, IndexError, KeyError, TypeError, ValueError):
         raise error(f"{source}: its metadata 'surfsig' are broken") from None
-    return cloud_from_columns(columns, source=source, viewpoint=sensor, grid=organised, error=error)
+    cloud = cloud_from_columns(columns, source=source, viewpoint=sensor, grid=organised, error=error)
+    return replace(cloud, coordinate_system=system)
 
 
 def table(
@@ -91,6 +96,8 @@ def metadata(cloud: PointCloud, notes: Mapping[str, str]) -> dict[bytes, str]:
         told["viewpoint"] = cloud.viewpoint.tolist()
     if cloud.grid is not None:
         told["grid"] = list(cloud.grid)
+    if cloud.coordinate_system is not None:
+        told["coordinate_system"] = cloud.coordinate_system.to_text()
     return {_NOTES: json.dumps(told)}
 
 

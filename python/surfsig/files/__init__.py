@@ -7,6 +7,7 @@ a file called ``scan.pcd`` are therefore read as PLY. What is written has the fo
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files import formats
 from surfsig.files.atomic import check_target, replacing
 from surfsig.files.columns import Chunks, output_columns
-from surfsig.files.options import box_array, cropped, in_metres, metres_per
+from surfsig.files.options import box_array, check_unit, cropped, in_metres, metres_per
 from surfsig.files.progress import Progress, ProgressCallback
 from surfsig.files.sequence import ScanSequence, TimedScan, scan_sequence
 from surfsig.files.trajectory import (
@@ -71,7 +72,7 @@ def read(
         unit; both belong to it. A COPC file is read no further than the box asks for.
     unit
         What the file's numbers are: "mm", "cm", "m", "km", "in", "ft" or "us-ft". The cloud is then in
-        metres; by default it stays as it is.
+        metres, and in no coordinate system; by default it stays as it is.
     scan
         Of an E57 file with several scans, the one with this number, from 0; by default all of them.
     samples
@@ -101,7 +102,8 @@ def read(
     -----
     UserWarning
         If the last line of a text file is cut off (it is dropped) or may be, or values are left out that are
-        no numbers.
+        no numbers. If the coordinates are degrees, in two units, or not in the `unit` given. If the header
+        contradicts the file, and one of the two is clearly right.
 
     Notes
     -----
@@ -134,6 +136,7 @@ def read(
             if given:
                 raise
             raise FileFormatError(f"{path}: {error}") from error
+    check_unit(cloud.coordinate_system, unit, str(path))
     if corners is not None:
         cloud = cropped(cloud, corners)
     return cloud if metres is None else in_metres(cloud, metres)
@@ -200,9 +203,11 @@ def write(
     path
         The file; ``.ply``, ``.pcd``, ``.las``, ``.laz``, ``.e57``, ``.npz`` or ``.parquet``.
     cloud
-        Its points come first (in PLY, PCD and E57 as double where float would change one of them; in LAS and
-        LAZ rounded to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields. In E57 its
-        viewpoint, or its viewpoints, become the poses of its scans. Or what else `PointCloud.of` takes.
+        Its points come first (in PLY and E57 as double where float would change one of them; in PCD, of which
+        most readers take floats only, once more as doubles, and where float is too coarse about an origin; in
+        LAS and LAZ rounded to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields. In
+        E57 its viewpoint, or its viewpoints, become the poses of its scans. LAS, LAZ, PCD, NPZ and Parquet
+        keep its coordinate system. Or what else `PointCloud.of` takes.
     columns
         (n,) or (n, k) numbers by name. ``normals`` (n, 3) are written as nx, ny, nz and ``colors`` (n, 3 or
         4) as red, green, blue (and alpha); PCD packs colours of uint8 into ``rgb`` or ``rgba``. Any other
@@ -227,8 +232,10 @@ def write(
     Warns
     -----
     UserWarning
-        If points that are not finite are left out (LAS and LAZ), or the
-        viewpoints of several scans cannot be written, because their points are mixed (E57).
+        If points that are not finite are left out (LAS and LAZ), coordinates are written about an origin
+        (PCD), the coordinate system stays GeoTIFF keys (LAS and LAZ), the viewpoints of several scans cannot
+        be written, because their points are mixed (E57), or the name is that of a COPC file: COPC is read,
+        and not written.
     """
     path = Path(path)
     cloud = PointCloud.of(cloud)
@@ -242,6 +249,11 @@ def write(
             )
         taken.add(block_column.name)
     told = dict(notes or {})
+    if path.name.lower().endswith(".copc.laz"):
+        warnings.warn(
+            f"{path}: is written as LAZ, without the octree that its name promises: COPC is only read",
+            stacklevel=2,
+        )
     with replacing(path) as file:
         writer(
             file,

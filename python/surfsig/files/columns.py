@@ -96,6 +96,10 @@ def cloud_from_columns(
     for axis in axes:
         if columns[axis].dtype.kind not in "fiu":
             raise error(f"{source}: column '{axis}' holds {columns[axis].dtype}, not real numbers")
+        if columns[axis].ndim != 1:
+            raise error(
+                f"{source}: column '{axis}' holds {columns[axis].shape[1]} numbers per point, not one"
+            )
     # Joining with float32 gives float32 to small types, and float64 to all that would lose digits.
     joint = np.result_type(np.float32, *(columns[axis].dtype for axis in axes))
     shared = _shared_rows(*(columns[axis] for axis in axes))

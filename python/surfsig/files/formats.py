@@ -21,6 +21,7 @@ from surfsig.files import (
     obj,
     parquet,
     pcd,
+    pcd_header,
     pcd_write,
     ply,
     stl,
@@ -153,7 +154,9 @@ _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
 # those that have no mark of their own.
 FORMATS = (
     Format("PLY", (".ply",), _matches(ply.MAGIC), ply.read, ply.write),
-    Format("PCD", (".pcd",), _matches(pcd.MAGIC), pcd.read, pcd_write.write, reserved=pcd_write.RESERVED),
+    Format(
+        "PCD", (".pcd",), _matches(pcd_header.MAGIC), pcd.read, pcd_write.write, reserved=pcd_write.RESERVED
+    ),
     Format("NPY", (".npy",), _begins(numpy_files.NPY_MAGIC), numpy_files.read_npy),
     Format(
         "NPZ",

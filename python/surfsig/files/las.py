@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import struct
 from collections.abc import Iterator, Mapping
 from typing import Any, BinaryIO
 
@@ -14,20 +13,15 @@ from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
 from surfsig.files.columns import blocks_of, with_colours
-from surfsig.files.laz_chunks import PIECE_BYTES, copc_chunks, decoded, laz_chunks, one_line_errors
+from surfsig.files.las_counts import LARGEST_HEADER, Held, agreed_count, end_of_points
+from surfsig.files.las_header import RECORD_ID, USER_ID, check_coordinates, read_header
+from surfsig.files.laz_chunks import PIECE_BYTES, Chunk, copc_chunks, decoded, laz_chunks, one_line_errors
 from surfsig.files.options import inside
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
-# The record with what LAS has no place for.
-USER_ID, RECORD_ID = "surfsig", 1
-
-_VLR_HEADER_BYTES = 54
-_SMALLEST_HEADER = 227
 # Few enough that a block of records stays in the processor's cache while it is taken apart.
 _BLOCK_POINTS = 1 << 13
-# A scale or offset with which coordinates could become infinite.
-_ABSURD = 1e200
 # No field has this name.
 _COORDINATES = ""
 
@@ -41,7 +35,7 @@ def read(
     the header's scale, so that `PointCloud.points` is what laspy gives, to the last bit. Every dimension of
     the point format becomes a field, extra bytes included, those with a scale as float64. Colours are uint16
     as stored, or uint8 if none is above 255. Of a file that surfsig wrote, dimensions that it left empty
-    are no fields.
+    are no fields. The coordinate system is that of the records, before or behind the points.
 
     At its peak it needs the memory of the cloud (50 bytes per point in point format 7, and 6 more if colours
     become uint8), and about 80 MB for the points being decoded; with a box, that of the points in it. Columns
@@ -51,14 +45,20 @@ def read(
     ------
     FileFormatError
         If the file is cut off or broken.
+
+    Warns
+    -----
+    UserWarning
+        If the header contradicts the file in its number of points, where they start or their extra bytes.
     """
     size = os.fstat(file.fileno()).st_size
-    header = _read_header(file, source, size)
+    header, promised, coordinate_system = read_header(file, source, size)
+    chunks = _chunks(file, header, promised, box, source, size)
+    if header.point_count:
+        check_coordinates(header, source)
     origin = np.array(header.offsets)
-    if not (np.abs([origin, header.scales]) < _ABSURD).all():
-        raise FileFormatError(f"{source}: the scale or offset in its header makes no sense")
     columns = _Columns(header.point_count)
-    for block in _blocks(file, header, box, source, size, progress):
+    for block in _blocks(file, header, chunks, source, progress):
         offsets = np.column_stack([block[axis] * header.scales[i] for i, axis in enumerate("XYZ")])
         if box is not None:
             chosen = inside(offsets, origin, box)
@@ -78,7 +78,12 @@ def read(
             }
         grid = told.get("grid") if box is None else None
         return PointCloud(
-            offsets, origin, told.get("viewpoint"), with_colours(fields), tuple(grid) if grid else None
+            offsets,
+            origin,
+            told.get("viewpoint"),
+            with_colours(fields),
+            tuple(grid) if grid else None,
+            coordinate_system=coordinate_system,
         )
 
 
@@ -111,57 +116,49 @@ class _Columns:
             array.resize((room, *array.shape[1:]), refcheck=False)
 
 
-def _read_header(file: BinaryIO, source: str, size: int) -> LasHeader:
-    """Read the header once the sizes in it, which laspy believes, are those of the file."""
-    head = file.read(_SMALLEST_HEADER)
-    if len(head) < _SMALLEST_HEADER:
-        raise FileFormatError(f"{source}: cut off: a LAS header has {_SMALLEST_HEADER} bytes or more")
-    header_size, start, records = struct.unpack_from("<HII", head, 94)
-    if start > size or header_size + records * _VLR_HEADER_BYTES > start:
-        raise FileFormatError(
-            f"{source}: cut off or broken: its header promises {records} records and points from byte "
-            f"{start} on, the file has {size} bytes"
-        )
-    file.seek(0)
-    with one_line_errors(source):
-        header = LasHeader.read_from(file)
-        # A description of extra bytes may be read and still make no type.
-        header.point_format.dtype()
-    return header
-
-
-def _blocks(
+def _chunks(
     file: BinaryIO,
     header: LasHeader,
+    promised: tuple[int, ...],
     box: NDArray[np.float64] | None,
     source: str,
     size: int,
-    progress: Progress,
+) -> list[Chunk]:
+    """Find the compressed points, with a box perhaps only those near it, and settle how many there are."""
+    if header.are_points_compressed:
+        near = copc_chunks(file, header, box, source, size) if box is not None and any(promised) else None
+        return laz_chunks(file, header, source, size, promised) if near is None else near
+    start, point_size = header.offset_to_point_data, header.point_format.size
+    file.seek(0)
+    length = end_of_points(file.read(LARGEST_HEADER), start, size) - start
+    held = Held(length // point_size, length // point_size, whole=length % point_size == 0)
+    count = agreed_count(header, promised, held, source, room=(size - start) // point_size)
+    if start + count * point_size > size:
+        raise FileFormatError(
+            f"{source}: cut off: its header promises {count} points of {point_size} bytes, "
+            f"the file has {size}"
+        )
+    header.point_count = count
+    return []
+
+
+def _blocks(
+    file: BinaryIO, header: LasHeader, chunks: list[Chunk], source: str, progress: Progress
 ) -> Iterator[NDArray[Any]]:
-    """Give the points block by block, as laspy's records; with a box perhaps only those near it."""
+    """Give the points block by block, as laspy's records."""
     # A file without points has fields.
     yield np.empty(0, header.point_format.dtype())
     if header.are_points_compressed:
-        chunks = None if box is None else copc_chunks(file, header, box, source, size)
-        if chunks is None and header.point_count:
-            chunks = laz_chunks(file, header, source, size)
-        pieces = decoded(file, header, chunks or [], source, progress)
+        pieces = decoded(file, header, chunks, source, progress) if chunks else iter(())
     else:
-        pieces = _uncompressed(file, header, source, size, progress)
+        pieces = _uncompressed(file, header, progress)
     for records in pieces:
         yield from blocks_of(records, _BLOCK_POINTS)
 
 
-def _uncompressed(
-    file: BinaryIO, header: LasHeader, source: str, size: int, progress: Progress
-) -> Iterator[NDArray[Any]]:
-    start, dtype = header.offset_to_point_data, header.point_format.dtype()
-    if start + header.point_count * dtype.itemsize > size:
-        raise FileFormatError(
-            f"{source}: cut off: its header promises {header.point_count} points of {dtype.itemsize} bytes, "
-            f"the file has {size}"
-        )
-    file.seek(start)
+def _uncompressed(file: BinaryIO, header: LasHeader, progress: Progress) -> Iterator[NDArray[Any]]:
+    dtype = header.point_format.dtype()
+    file.seek(header.offset_to_point_data)
     step = max(1, PIECE_BYTES // dtype.itemsize)
     for first in range(0, header.point_count, step):
         data = file.read(min(step, header.point_count - first) * dtype.itemsize)

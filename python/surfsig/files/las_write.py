@@ -13,9 +13,18 @@ import numpy as np
 from laspy.point.dims import DimensionInfo, DimensionKind
 from numpy.typing import NDArray
 
+from surfsig.coordinate_system import CoordinateSystem
 from surfsig.errors import InvalidInputError
 from surfsig.files.columns import Chunks, aligned_blocks, blocks_of, column_names, scalar_columns
-from surfsig.files.las import RECORD_ID, USER_ID
+from surfsig.files.las_header import (
+    GEO_DOUBLES,
+    GEO_KEYS,
+    GEO_TEXT,
+    PROJECTION,
+    RECORD_ID,
+    USER_ID,
+    WKT,
+)
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
@@ -55,7 +64,9 @@ def write_laz(
     multiples of, as those of most LAS files are; otherwise the finest with which they fit 32 bits, and each
     moves by half a step at most. A column goes to the dimension of LAS with its name if its values fit there
     (whole numbers in range), any other becomes extra bytes; (n, k) columns become NAME_0, NAME_1, ...; names
-    are cut to 32 bytes. Viewpoint, grid and notes stand in a record of user id "surfsig".
+    are cut to 32 bytes. Viewpoint, grid and notes stand in a record of user id "surfsig". The coordinate
+    system is written as WKT; GeoTIFF keys are turned into it where pyproj is installed and knows them, and
+    otherwise stay what they are. A COPC file is not written: LAZ is.
 
     Raises
     ------
@@ -65,7 +76,8 @@ def write_laz(
     Warns
     -----
     UserWarning
-        If points that are not finite are left out: LAS cannot hold them.
+        If points that are not finite are left out: LAS cannot hold them. If the coordinate system is not
+        written as WKT, or not at all.
     """
     _write(file, cloud, columns, chunks, notes, progress, compressed=True)
 
@@ -109,6 +121,7 @@ def _write(
             # laspy would look at the first point of each block only.
             described.options &= ~(described.MIN_BIT_MASK | described.MAX_BIT_MASK)
     header.scales, header.offsets = np.full(3, 10.0**-decimals), offset
+    # The bit says that the coordinate system is WKT, as the standard wants it for these point formats.
     header.global_encoding.wkt = True
     header.generating_software = "surfsig"
     # A fixed date: the same points give the same file.
@@ -122,6 +135,8 @@ def _write(
     if len(text) > _MAX_RECORD_BYTES:
         raise InvalidInputError(f"the notes are too long for LAS ({len(text)} bytes)")
     header.vlrs.append(laspy.VLR(USER_ID, RECORD_ID, "what LAS has no place for", text))
+    if cloud.coordinate_system is not None:
+        _add_coordinate_system(header, cloud.coordinate_system)
 
     kept_error = _KeepsError(file)
     try:
@@ -153,6 +168,30 @@ def _write(
         writer.close()
     except Exception as error:
         raise kept_error.error or error from None
+
+
+def _add_coordinate_system(header: laspy.LasHeader, system: CoordinateSystem) -> None:
+    """Add the records of a coordinate system: WKT, or GeoTIFF keys that cannot be turned into it."""
+    user_id, wkt, keys = PROJECTION.decode(), system.to_wkt(), system.geo_keys
+    if wkt is not None:
+        records = {WKT: wkt.encode() + b"\0"}
+    elif keys is not None:
+        warnings.warn(
+            "the coordinate system is written as GeoTIFF keys, as it was read, although LAS 1.4 wants WKT: "
+            "pyproj, which turns one into the other (pip install 'surfsig[crs]'), is missing or does not "
+            "know it",
+            stacklevel=5,
+        )
+        header.global_encoding.wkt = False
+        records = {GEO_KEYS: keys.directory, GEO_DOUBLES: keys.doubles, GEO_TEXT: keys.text}
+    else:
+        records = {}
+    if any(len(data) > _MAX_RECORD_BYTES for data in records.values()):
+        warnings.warn("the coordinate system is left out: it is too long for LAS", stacklevel=5)
+        return
+    header.vlrs.extend(
+        laspy.VLR(user_id, number, "coordinate system", data) for number, data in records.items() if data
+    )
 
 
 class _KeepsError:

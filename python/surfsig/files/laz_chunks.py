@@ -7,6 +7,7 @@ every size is compared with the file before lazrs sees it.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import struct
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
 from surfsig.files import laz_child
+from surfsig.files.las_counts import Held, agreed_count
 from surfsig.files.progress import Progress
 
 # Points are decoded in pieces of about so many bytes: several chunks, one for each thread.
@@ -27,7 +29,19 @@ PIECE_BYTES = 32 << 20
 MAX_RATIO = 1000
 
 _COMPRESSOR_WITHOUT_CHUNKS = 1
-_ITEMS_START = 34
+# What lazrs decodes: compressors (by points, by points in chunks, by layers in chunks), and the versions of
+# each type of item.
+_COMPRESSORS = (1, 2, 3)
+_OLD_VERSIONS, _LAYERED_VERSIONS = (1, 2), (3, 4)
+_ITEM_VERSIONS = {
+    0: ("extra bytes", _OLD_VERSIONS), 6: ("Point10", _OLD_VERSIONS), 7: ("GPSTime11", _OLD_VERSIONS),
+    8: ("RGB12", _OLD_VERSIONS), 9: ("Wavepacket13", _OLD_VERSIONS), 10: ("Point14", _LAYERED_VERSIONS),
+    11: ("RGB14", _LAYERED_VERSIONS), 12: ("RGBNIR14", _LAYERED_VERSIONS),
+    13: ("Wavepacket14", _LAYERED_VERSIONS), 14: ("Byte14", _LAYERED_VERSIONS),
+}  # fmt: skip
+# Before the chunks stands where their table is.
+_PLACE_BYTES = 8
+_ITEMS_START, _ITEM_BYTES = 34, 6
 _HIERARCHY_ENTRY = np.dtype(
     [("level", "<i4"), ("cell", "<i4", 3), ("offset", "<u8"), ("size", "<i4"), ("points", "<i4")]
 )
@@ -59,23 +73,42 @@ def one_line_errors(source: str) -> Iterator[None]:
         raise FileFormatError(f"{source}: the LAS file is cut off or broken ({text})") from None
 
 
-def laz_chunks(file: BinaryIO, header: LasHeader, source: str, size: int) -> list[Chunk]:
-    """Find all chunks of a LAZ file of `size` bytes, in its order.
+def laz_chunks(
+    file: BinaryIO, header: LasHeader, source: str, size: int, promised: Sequence[int] = ()
+) -> list[Chunk]:
+    """Find all chunks of a LAZ file of `size` bytes, in its order, and settle `header.point_count`.
+
+    Where they tell how many points they hold, and the header promises another number (it may promise two),
+    the chunks are right.
 
     Raises
     ------
     FileFormatError
         If they do not lie in the file, or do not hold the points that the header promises.
+
+    Warns
+    -----
+    UserWarning
+        If the header promises fewer points than the chunks hold, or two numbers.
     """
     import lazrs
 
-    record = _laszip_record(header, source)
+    promised = promised or (header.point_count,)
     start = header.offset_to_point_data
+    if not any(promised) and size - start <= _PLACE_BYTES:
+        return []
+    record = _laszip_record(header, source)
     if record[0] == _COMPRESSOR_WITHOUT_CHUNKS:
+        held = Held(1, max(2, *promised))
+        header.point_count = agreed_count(header, promised, held, source)
         return [Chunk(start, size - start, header.point_count)]
     table_start = _chunk_table_start(file, start, size, source)
     file.seek(table_start)
-    _, count = struct.unpack("<II", file.read(8))
+    version, count = struct.unpack("<II", file.read(8))
+    if version:
+        raise FileFormatError(
+            f"{source}: the table of its LAZ chunks has version {version}, which cannot be read (only 0 can)"
+        )
     # Every chunk begins with a whole point.
     if count > (table_start - start) // header.point_format.size:
         raise FileFormatError(f"{source}: cut off or broken: its table promises {count} chunks")
@@ -83,19 +116,45 @@ def laz_chunks(file: BinaryIO, header: LasHeader, source: str, size: int) -> lis
     with one_line_errors(source):
         vlr = lazrs.LazVlr(record)
         table = lazrs.read_chunk_table(file, vlr) if count else []
-    chunks, place, left = [], start + 8, header.point_count
-    for points, length in table:
+    places = [start + _PLACE_BYTES, *(length for _, length in table)]
+    places = list(itertools.accumulate(places))
+    held = _held(file, header, table, places, table_start, variable=vlr.uses_variable_size_chunks())
+    total = agreed_count(header, promised, held, source) if places[-1] <= table_start else max(promised)
+    chunks, left = [], total
+    for (points, length), place in zip(table, places, strict=False):
         # The last chunk's own number of points is not in a table of equal chunks.
-        held = points if vlr.uses_variable_size_chunks() else min(points, left)
-        chunks.append(Chunk(place, length, held))
-        place += length
-        left -= held
-    if place > table_start or left:
+        chunks.append(Chunk(place, length, min(points, left)))
+        left -= chunks[-1].points
+    if places[-1] > table_start or left:
         raise FileFormatError(
-            f"{source}: cut off or broken: its header promises {header.point_count} points, "
-            f"its chunks hold {header.point_count - left} in {place - start} bytes of {table_start - start}"
+            f"{source}: cut off or broken: its header promises {total} points, its chunks hold "
+            f"{total - left} in {places[-1] - start} bytes of {table_start - start}"
         )
+    header.point_count = total
     return [chunk for chunk in chunks if chunk.points]
+
+
+def _held(
+    file: BinaryIO,
+    header: LasHeader,
+    table: Sequence[tuple[int, int]],
+    places: Sequence[int],
+    table_start: int,
+    *,
+    variable: bool,
+) -> Held:
+    """Say how many points chunks hold; of equal ones, the last tells it itself from point format 6 on."""
+    total = sum(points for points, _ in table)
+    if not table or variable:
+        return Held(total, total)
+    points, length = table[-1]
+    place, point_size = places[-2], header.point_format.size
+    if header.point_format.id >= 6 and length >= point_size + 4 and place + length <= table_start:
+        file.seek(place + point_size)
+        (own,) = struct.unpack("<I", file.read(4))
+        if 0 < own <= points:
+            return Held(total - points + own, total - points + own)
+    return Held(total - points + 1, total)
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -205,14 +264,37 @@ def _laszip_record(header: LasHeader, source: str) -> bytes:
     kind = header.point_format
     with one_line_errors(source):
         found: bytes = header.vlrs[header.vlrs.index("LasZipVlr")].record_data
+        _check_compressor(found, source)
         expected = lazrs.LazVlr.new_for_compression(kind.id, kind.num_extra_bytes).record_data()
-    # Items are (type, size, version); versions differ, and lazrs checks them.
+    # Items are (type, size, version), and versions differ.
     items, usual = (
-        [data[start : start + 4] for start in range(_ITEMS_START, len(data), 6)] for data in (found, expected)
+        [data[start : start + 4] for start in range(_ITEMS_START, len(data), _ITEM_BYTES)]
+        for data in (found, expected)
     )
     if items != usual or len(found) != len(expected):
         raise FileFormatError(f"{source}: the LAZ compression is not that of point format {kind.id}")
+    _check_versions(found, source)
     return found
+
+
+def _check_compressor(record: bytes, source: str) -> None:
+    compressor, _, major, minor, revision = struct.unpack_from("<HHBBH", record)
+    if compressor not in _COMPRESSORS:
+        raise FileFormatError(
+            f"{source}: its points were compressed by LASzip {major}.{minor}.{revision} with compressor "
+            f"{compressor}, which cannot be decoded (only {', '.join(map(str, _COMPRESSORS))} can)"
+        )
+
+
+def _check_versions(record: bytes, source: str) -> None:
+    for start in range(_ITEMS_START, len(record), _ITEM_BYTES):
+        item, _, version = struct.unpack_from("<HHH", record, start)
+        name, known = _ITEM_VERSIONS[item]
+        if version not in known:
+            raise FileFormatError(
+                f"{source}: its points were compressed with version {version} of {name}, which cannot be "
+                f"decoded (only {' and '.join(map(str, known))} can)"
+            )
 
 
 def _chunk_table_start(file: BinaryIO, start: int, size: int, source: str) -> int:

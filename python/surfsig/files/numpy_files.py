@@ -9,12 +9,14 @@ import warnings
 import zipfile
 import zlib
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import IO, Any, BinaryIO
 
 import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from surfsig.coordinate_system import CoordinateSystem
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.columns import (
     Chunks,
@@ -30,7 +32,7 @@ from surfsig.point_cloud import PointCloud
 NPY_MAGIC = npy.MAGIC_PREFIX
 ZIP_MAGIC = b"PK"
 # Names in an NPZ file that are no field of the points.
-RESERVED = ("points", "viewpoint", "grid", "origin", "notes")
+RESERVED = ("points", "viewpoint", "grid", "origin", "notes", "coordinate_system")
 # The most bytes that one byte of a deflated member makes.
 MAX_DEFLATE_RATIO = 1032
 # What a broken ZIP archive raises: RuntimeError if encrypted, NotImplementedError if compressed unusually.
@@ -54,8 +56,8 @@ def read_npz(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
     """Read an open NPZ file.
 
     The coordinates are the array ``points`` (n, 3 or more), or x, y and z, or the only array of the file;
-    other numeric arrays with n rows become fields. ``viewpoint`` (3,), ``grid`` (2,) and ``origin`` (3,) mean
-    what `PointCloud` says.
+    other numeric arrays with n rows become fields. ``viewpoint`` (3,), ``grid`` (2,), ``origin`` (3,) and
+    ``coordinate_system`` (a text) mean what `PointCloud` says.
 
     Raises
     ------
@@ -112,9 +114,10 @@ def read_npz(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
         cloud = cloud_from_columns(
             columns, source=source, viewpoint=notes["viewpoint"], grid=_grid(notes["grid"])
         )
-        if notes["origin"] is None:
-            return cloud
-        return PointCloud(cloud.offsets, notes["origin"], cloud.viewpoint, cloud.fields, cloud.grid)
+        if notes["coordinate_system"] is not None:
+            system = CoordinateSystem.from_text(str(notes["coordinate_system"]))
+            cloud = replace(cloud, coordinate_system=system)
+        return cloud if notes["origin"] is None else replace(cloud, origin=notes["origin"])
     except (InvalidInputError, TypeError, ValueError) as error:
         raise FileFormatError(f"{source}: {error}") from None
 
@@ -133,6 +136,8 @@ def write_npz(
         arrays["viewpoint"] = cloud.viewpoint
     if cloud.grid is not None:
         arrays["grid"] = np.array(cloud.grid)
+    if cloud.coordinate_system is not None:
+        arrays["coordinate_system"] = np.array(cloud.coordinate_system.to_text())
     if notes:
         arrays["notes"] = np.array(json.dumps(dict(notes)))
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:

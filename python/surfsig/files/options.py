@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surfsig.coordinate_system import SAME_UNIT, CoordinateSystem
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud
 
@@ -64,4 +66,54 @@ def in_metres(cloud: PointCloud, metres: float) -> PointCloud:
         origin=cloud.origin * metres,
         viewpoint=viewpoint,
         viewpoints=viewpoints,
+        coordinate_system=None,
+    )
+
+
+def check_unit(system: CoordinateSystem | None, unit: str | None, source: str) -> None:
+    """Warn where the unit of a file's coordinates is no length, is not the caller's, or is two units.
+
+    Parameters
+    ----------
+    system
+        What the file says.
+    unit
+        What the caller says, one of `UNITS`; None for nothing.
+    source
+        The file's name.
+    """
+    if system is None:
+        return
+    if system.is_geographic:
+        warnings.warn(
+            f"{source}: its coordinates are in {system.unit or 'degree'}s, which are no lengths: radius and "
+            "curvature have no meaning; project them to a system in metres first",
+            stacklevel=3,
+        )
+    if unit is not None and (
+        system.is_geographic or (system.metres_per_unit is not None and unit_of(system) != unit)
+    ):
+        warnings.warn(
+            f"{source}: its numbers were taken for {unit}, but its coordinate system says {system.unit}",
+            stacklevel=3,
+        )
+    two = system.vertical_unit not in (None, system.unit)
+    if two and not system.is_geographic and system.unit is not None:
+        warnings.warn(
+            f"{source}: its x and y are in the unit {system.unit}, its z in the unit "
+            f"{system.vertical_unit}: shapes and curvature are distorted; bring them to one unit first",
+            stacklevel=3,
+        )
+
+
+def unit_of(system: CoordinateSystem) -> str | None:
+    """Give the name in `UNITS` of a system's horizontal unit; None if it has none there."""
+    size = system.metres_per_unit
+    return next(
+        (
+            unit
+            for unit, metres in UNITS.items()
+            if size is not None and abs(size - metres) <= SAME_UNIT * metres
+        ),
+        None,
     )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from surfsig.convert.libraries import library
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.columns import cloud_from_columns, columns_of
-from surfsig.files.pcd import MAX_NUMBERS, PACKED_COLOURS
+from surfsig.files.pcd_header import MAX_NUMBERS, PACKED_COLOURS
 from surfsig.point_cloud import PointCloud
 
 ROS1_SUFFIX = ".bag"

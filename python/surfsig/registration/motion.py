@@ -18,7 +18,8 @@ _NORMALS = (("nx", "ny", "nz"), ("normals",), ("normal",), ("normal_x", "normal_
 def moved(cloud: PointCloud, pose: Array) -> PointCloud:
     """Move a cloud by T_target_source (4, 4): its points, viewpoints and normals.
 
-    Offsets stay in float32 where they were, about the moved origin.
+    Offsets stay in float32 where they were, about the moved origin. The moved cloud is in no coordinate
+    system that is known.
     """
     rotation, shift = pose[:3, :3], pose[:3, 3]
 
@@ -41,6 +42,7 @@ def moved(cloud: PointCloud, pose: Array) -> PointCloud:
         viewpoint=None if cloud.viewpoint is None else place(cloud.viewpoint),
         viewpoints=None if cloud.viewpoints is None else place(cloud.viewpoints),
         fields=fields,
+        coordinate_system=None,
     )
 
 

@@ -1,0 +1,423 @@
+"""LAS and LAZ files whose header contradicts the file: read with a warning, or refused with the reason."""
+
+import contextlib
+import io
+import struct
+import warnings
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import laspy
+import numpy as np
+import pytest
+from laspy.vlrs.known import ExtraBytesStruct
+from numpy.typing import NDArray
+
+from surfsig.errors import FileFormatError
+from surfsig.files import read
+from surfsig.point_cloud import PointCloud
+
+COUNT = 700
+LEGACY, NEW, POINTS_BY_RETURN, START, SCALES = (107, "I"), (247, "Q"), 255, (96, "I"), 131
+"""Where these stand in a header."""
+BYTES = (np.arange(4 * COUNT) % 200).astype(np.uint8).reshape(COUNT, 4)
+
+
+def points(count: int = COUNT) -> NDArray[np.float64]:
+    i = np.arange(count)
+    return np.column_stack([0.1 * i, 0.2 * i + 1, 0.05 * i**2])
+
+
+def las(
+    point_format: int = 6,
+    version: str = "1.4",
+    *,
+    compressed: bool = False,
+    extra: Mapping[str, NDArray[Any]] = MappingProxyType({}),
+) -> bytearray:
+    """Make a file of laspy's with `points` and these extra dimensions."""
+    header = laspy.LasHeader(point_format=point_format, version=version)
+    header.scales = np.full(3, 0.001)
+    header.add_extra_dims(
+        [laspy.ExtraBytesParams(name, f"{values.shape[1]}u1") for name, values in extra.items()]
+    )
+    data = laspy.LasData(header)
+    data.xyz = points()
+    data.return_number[:] = np.ones(COUNT, np.uint8)
+    for name, values in extra.items():
+        data[name] = values
+    file = io.BytesIO()
+    data.write(file, do_compress=compressed)
+    return bytearray(file.getvalue())
+
+
+def patched(content: bytes | bytearray, *changes: tuple[int, str, float]) -> bytearray:
+    changed = bytearray(content)
+    for place, kind, value in changes:
+        struct.pack_into("<" + kind, changed, place, value)
+    return changed
+
+
+def cloud_of(folder: Path, content: bytes | bytearray, **options: Any) -> PointCloud:
+    path = folder / "a.las"
+    path.write_bytes(content)
+    return read(path, **options)
+
+
+@contextlib.contextmanager
+def no_warning() -> Iterator[None]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
+
+
+def assert_whole(cloud: PointCloud, count: int = COUNT) -> None:
+    np.testing.assert_allclose(cloud.points, points(count), atol=6e-4)
+
+
+def refused(folder: Path, content: bytes | bytearray, message: str) -> None:
+    with pytest.raises(FileFormatError, match=message) as error:
+        cloud_of(folder, content)
+    assert "\n" not in str(error.value)
+
+
+# The files of the shared folder.
+
+
+def test_las14_legacy_only(shared_data: Path) -> None:
+    with pytest.warns(UserWarning, match="promises 0 points, but it holds 20; all of them were read"):
+        assert_whole(read(shared_data / "odd_files/las_counts/las14_legacy_only.las"), 20)
+
+
+def test_las_count0_but_points(shared_data: Path) -> None:
+    with pytest.warns(UserWarning, match="promises 0 points, but it holds 20; all of them were read"):
+        assert_whole(read(shared_data / "odd_files/las_counts/las_count0_but_points.las"), 20)
+
+
+def test_las_asprs150_two_ebvlr(shared_data: Path) -> None:
+    with no_warning():
+        cloud = read(shared_data / "odd_files/las_extra_bytes/las_asprs150_two_ebvlr.las")
+    assert_whole(cloud, 20)
+    assert list(cloud.fields)[-2:] == ["amp", "ref"]
+    np.testing.assert_allclose(cloud.fields["amp"], 0.5 * np.arange(20))
+    np.testing.assert_allclose(cloud.fields["ref"], 10 + 0.01 * np.arange(20))
+
+
+def test_las_pdal4078_eb_exceeds(shared_data: Path) -> None:
+    with pytest.warns(UserWarning, match=r"do not have, or of an unknown type: b; they are left out"):
+        cloud = read(shared_data / "odd_files/las_extra_bytes/las_pdal4078_eb_exceeds.las")
+    assert_whole(cloud, 20)
+    assert list(cloud.fields)[-1] == "a"
+
+
+# Numbers of points.
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize(("point_format", "version"), [(6, "1.4"), (3, "1.4"), (7, "1.4")])
+def test_only_the_legacy_count_is_filled(
+    tmp_path: Path, point_format: int, version: str, compressed: bool
+) -> None:
+    content = las(point_format, version, compressed=compressed)
+    with no_warning():
+        assert_whole(cloud_of(tmp_path, patched(content, (*NEW, 0), (*LEGACY, COUNT))))
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize(("legacy", "new"), [(COUNT, 690), (690, COUNT), (COUNT, 10**12), (2**32 - 1, COUNT)])
+def test_legacy_and_new_counts_disagree(tmp_path: Path, legacy: int, new: int, compressed: bool) -> None:
+    content = patched(las(compressed=compressed), (*NEW, new), (*LEGACY, legacy))
+    with pytest.warns(UserWarning, match=f"{new} points in one place and {legacy} in another; 700 were read"):
+        assert_whole(cloud_of(tmp_path, content))
+
+
+@pytest.mark.parametrize(("point_format", "version"), [(3, "1.2"), (6, "1.4"), (1, "1.4")])
+def test_a_count_of_0_with_points_behind_it(tmp_path: Path, point_format: int, version: str) -> None:
+    content = las(point_format, version)
+    zeros = [(*LEGACY, 0), *([(*NEW, 0)] if version == "1.4" else [])]
+    with pytest.warns(UserWarning, match="promises 0 points, but it holds 700; all of them were read$"):
+        assert_whole(cloud_of(tmp_path, patched(content, *zeros)))
+    with pytest.warns(UserWarning, match="it holds 699; all of them were read, and what follows them is no"):
+        assert_whole(cloud_of(tmp_path, patched(content, *zeros)[:-5]), 699)
+
+
+def test_a_count_of_0_in_laz(tmp_path: Path) -> None:
+    content = patched(las(compressed=True), (*NEW, 0), (*LEGACY, 0))
+    with pytest.warns(UserWarning, match="promises 0 points, but it holds 700"):
+        assert_whole(cloud_of(tmp_path, content))
+    # Before point format 6 no chunk says how many points it holds.
+    content = patched(las(3, "1.2", compressed=True), (*LEGACY, 0))
+    refused(tmp_path, content, "promises 0 points, but points follow, of which the number is not known")
+    record = content.index(b"laszip encoded") + 52
+    refused(tmp_path, patched(content, (record, "H", 1)), "of which the number is not known")
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize("point_format", [3, 6])
+def test_a_file_without_points_is_empty(tmp_path: Path, point_format: int, compressed: bool) -> None:
+    data = laspy.LasData(laspy.LasHeader(point_format=point_format))
+    file = io.BytesIO()
+    data.write(file, do_compress=compressed)
+    with no_warning():
+        assert len(cloud_of(tmp_path, file.getvalue())) == 0
+
+
+@pytest.mark.parametrize(("point_format", "version", "place"), [(3, "1.2", LEGACY), (6, "1.4", NEW)])
+def test_a_count_that_is_too_small(
+    tmp_path: Path, point_format: int, version: str, place: tuple[int, str]
+) -> None:
+    content = las(point_format, version)
+    with pytest.warns(UserWarning, match="promises 690 points, but it holds 700; all of them were read"):
+        assert_whole(cloud_of(tmp_path, patched(content, (*place, 690), (LEGACY[0], "I", 690))))
+    # Where the numbers by return confirm the count, what follows is something else.
+    by_return = (POINTS_BY_RETURN, "Q", 690) if version == "1.4" else (111, "I", 690)
+    changes = [(*place, 690), (LEGACY[0], "I", 690), by_return]
+    with pytest.warns(UserWarning, match="promises 690 points, and no more were read, but there are more"):
+        assert_whole(cloud_of(tmp_path, patched(content, *changes)), 690)
+    with pytest.warns(UserWarning, match="no more were read"):
+        assert_whole(cloud_of(tmp_path, content + bytes(1000)))
+
+
+def test_a_count_that_is_too_small_in_laz(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="promises 690 points, but it holds 700; all of them were read"):
+        assert_whole(cloud_of(tmp_path, patched(las(compressed=True), (*NEW, 690), (*LEGACY, 690))))
+
+
+def test_chunks_beyond_the_count_of_an_old_laz(tmp_path: Path) -> None:
+    header = laspy.LasHeader(point_format=3, version="1.2")
+    data = laspy.LasData(header)
+    data.xyz = np.arange(360_000).reshape(-1, 3) % 1000
+    file = io.BytesIO()
+    data.write(file, do_compress=True)
+    with pytest.warns(UserWarning, match=r"promises 60000 points, and no more .* 40001 points or more"):
+        cloud = cloud_of(tmp_path, patched(file.getvalue(), (*LEGACY, 60_000)))
+    np.testing.assert_allclose(cloud.points, data.xyz[:60_000])
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize("point_format", [3, 6])
+def test_a_count_that_is_too_large_is_refused(tmp_path: Path, point_format: int, compressed: bool) -> None:
+    content = las(point_format, "1.4", compressed=compressed)
+    changes = [(*place, 60_000) for place in (LEGACY, NEW)]
+    refused(tmp_path, patched(content, *changes), "cut off.*its header promises 60000 points")
+
+
+def test_records_behind_the_points_are_no_points(tmp_path: Path) -> None:
+    content = las()
+    record = struct.pack("<2x16sHQ32x", b"somebody", 7, 3000) + bytes(3000)
+    changes = [(235, "Q", len(content)), (243, "I", 1)]
+    with no_warning():
+        assert_whole(cloud_of(tmp_path, patched(content, *changes) + record))
+    with pytest.warns(UserWarning, match="promises 0 points, but it holds 700; all of them were read$"):
+        assert_whole(cloud_of(tmp_path, patched(content, *changes, (*NEW, 0), (*LEGACY, 0)) + record))
+
+
+# Scale, offset, start of the points.
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-200, -0.0])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("compressed", [False, True])
+def test_a_scale_of_0(tmp_path: Path, axis: int, value: float, compressed: bool) -> None:
+    content = patched(las(compressed=compressed), (SCALES + 8 * axis, "d", value))
+    refused(tmp_path, content, f"the scale of {'xyz'[axis]} in its header is .*: the header is broken")
+
+
+def test_a_scale_that_vanishes_beside_the_offset(tmp_path: Path) -> None:
+    content = patched(las(), (SCALES, "d", 1e-25), (SCALES + 24, "d", 5e5))
+    refused(tmp_path, content, "the scale of x in its header is 1e-25, so that all points")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300, 1e100])
+def test_a_scale_that_makes_no_sense(tmp_path: Path, value: float) -> None:
+    refused(tmp_path, patched(las(), (SCALES + 8, "d", value)), "the scale or offset in its header makes no")
+
+
+@pytest.mark.parametrize("start", [0, 375, 400, 1000])
+def test_a_start_of_the_points_that_is_wrong(tmp_path: Path, start: int) -> None:
+    content = las(extra={"label": BYTES})
+    (true,) = struct.unpack_from("<I", content, 96)
+    with pytest.warns(UserWarning, match=f"start at byte {start}; they were read from byte {true}, where"):
+        cloud = cloud_of(tmp_path, patched(content, (*START, start)))
+    assert_whole(cloud)
+    np.testing.assert_array_equal(cloud.fields["label"], BYTES)
+
+
+def test_a_start_inside_the_records_without_a_repair(tmp_path: Path) -> None:
+    content = las(extra={"label": BYTES})
+    message = "the points start at byte 400, its records end at byte 621"
+    refused(tmp_path, patched(content, (*START, 400)) + bytes(7), message)
+    compressed = las(compressed=True)
+    refused(tmp_path, patched(compressed, (*START, 400)), "the points start at byte 400, its records end at")
+
+
+# Extra bytes.
+
+
+def described(name: bytes, kind: int, options: int = 0, **more: Any) -> bytes:
+    struct_ = ExtraBytesStruct(name=name, data_type=(kind, options))
+    struct_.data_type, struct_.options = kind, options
+    for key, value in more.items():
+        getattr(struct_, key)[:] = [value] * 3
+    return bytes(struct_)
+
+
+def with_extra(rows: NDArray[Any], *records: bytes, compressed: bool = False) -> bytes:
+    """Make a file of point format 6 with these extra bytes and the records that describe them."""
+    raw = rows.view(np.uint8).reshape(COUNT, -1)
+    content = las(compressed=compressed, extra={"raw": raw})
+    start, end = struct.unpack_from("<I", content, 96)[0], len(content)
+    place = content.index(b"LASF_Spec") - 2
+    blocks = b"".join(struct.pack("<2x16sHH32x", b"LASF_Spec", 4, len(data)) + data for data in records)
+    shift = len(blocks) - (54 + 192)
+    changed = content[:place] + blocks + content[place + 54 + 192 :]
+    assert len(changed) == end + shift
+    others = struct.unpack_from("<I", content, 100)[0] - 1
+    struct.pack_into("<II", changed, 96, start + shift, others + len(records))
+    if compressed:
+        (table,) = struct.unpack_from("<q", changed, start + shift)
+        struct.pack_into("<q", changed, start + shift, table + shift)
+    return bytes(changed)
+
+
+ROWS = np.column_stack([np.arange(COUNT), 1000 + np.arange(COUNT)]).astype("<u2")
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_several_records_are_one_description(tmp_path: Path, compressed: bool) -> None:
+    scaled = described(b"ref", 3, 0b11000, _scale=0.01, _offset=5.0)
+    content = with_extra(ROWS, described(b"amp", 3), scaled, compressed=compressed)
+    with no_warning():
+        cloud = cloud_of(tmp_path, content)
+    assert_whole(cloud)
+    assert list(cloud.fields)[-2:] == ["amp", "ref"]
+    np.testing.assert_array_equal(cloud.fields["amp"], ROWS[:, 0])
+    np.testing.assert_allclose(cloud.fields["ref"], 5 + 0.01 * ROWS[:, 1])
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_more_bytes_are_described_than_points_have(tmp_path: Path, compressed: bool) -> None:
+    record = described(b"a", 3) + described(b"b", 10) + described(b"c", 1)
+    with pytest.warns(UserWarning, match="2 extra bytes of each point are not described") as told:
+        cloud = cloud_of(tmp_path, with_extra(ROWS, record, compressed=compressed))
+    assert any("an unknown type: b, c; they are left out" in str(one.message) for one in told)
+    assert_whole(cloud)
+    np.testing.assert_array_equal(cloud.fields["a"], ROWS[:, 0])
+    np.testing.assert_array_equal(cloud.fields["ExtraBytes"], ROWS[:, 1:].copy().view(np.uint8))
+    assert "c" not in cloud.fields
+
+
+def test_extra_bytes_are_described_that_points_do_not_have(tmp_path: Path) -> None:
+    record = struct.pack("<2x16sHH32x", b"LASF_Spec", 4, 192) + described(b"a", 3)
+    content = las()
+    (start,) = struct.unpack_from("<I", content, 96)
+    changed = patched(
+        content[:start] + record + content[start:], (*START, start + len(record)), (100, "I", 1)
+    )
+    with pytest.warns(UserWarning, match="describe extra bytes that its points do not have.*: a;"):
+        cloud = cloud_of(tmp_path, changed)
+    assert_whole(cloud)
+    assert "a" not in cloud.fields
+
+
+def test_fewer_bytes_are_described_than_there_are(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="2 extra bytes of each point are not described; they are the field"):
+        cloud = cloud_of(tmp_path, with_extra(ROWS, described(b"a", 3)))
+    np.testing.assert_array_equal(cloud.fields["a"], ROWS[:, 0])
+    np.testing.assert_array_equal(cloud.fields["ExtraBytes"], ROWS[:, 1:].copy().view(np.uint8))
+
+
+def test_extra_bytes_that_no_record_describes(tmp_path: Path) -> None:
+    with no_warning():
+        cloud = cloud_of(tmp_path, with_extra(ROWS))
+    assert_whole(cloud)
+    np.testing.assert_array_equal(cloud.fields["ExtraBytes"], ROWS.view(np.uint8))
+
+
+def test_raw_bytes_of_type_0_and_types_that_nobody_knows(tmp_path: Path) -> None:
+    # Of raw bytes the options are their number, which has the bits of a scale and an offset here.
+    wide = np.zeros((COUNT, 26), np.uint8)
+    wide[:, 24] = np.arange(COUNT) % 250
+    with no_warning():
+        cloud = cloud_of(tmp_path, with_extra(wide, described(b"raw", 0, 24) + described(b"label", 3)))
+    assert cloud.fields["raw"].shape == (COUNT, 24)
+    np.testing.assert_array_equal(cloud.fields["label"], np.arange(COUNT) % 250)
+    with pytest.warns(UserWarning, match=r"of an unknown type: odd, label; they are left out"):
+        cloud = cloud_of(tmp_path, with_extra(wide, described(b"odd", 77) + described(b"label", 3)))
+    assert_whole(cloud)
+    np.testing.assert_array_equal(cloud.fields["ExtraBytes"], wide)
+
+
+def test_names_that_are_taken_and_names_that_are_no_text(tmp_path: Path) -> None:
+    four = np.column_stack([ROWS, ROWS + 7])
+    record = b"".join(described(name, 3) for name in (b"amp", b"amp", b"intensity", b"\xff\xfe"))
+    with pytest.warns(
+        UserWarning, match="dimensions are called 'amp'; the second is the field 'amp_2'"
+    ) as told:
+        cloud = cloud_of(tmp_path, with_extra(four, record))
+    words = [str(one.message) for one in told]
+    assert any("the second is the field 'intensity_2'" in text for text in words)
+    names = ["amp", "amp_2", "intensity_2", "\ufffd\ufffd"]
+    assert list(cloud.fields)[-4:] == names
+    for name, values in zip(names, four.T, strict=True):
+        np.testing.assert_array_equal(cloud.fields[name], values)
+
+
+def test_a_scale_of_0_of_extra_bytes_does_not_make_zeros(tmp_path: Path) -> None:
+    record = described(b"a", 3, 0b01000, _scale=0.0) + described(b"b", 3)
+    with pytest.warns(UserWarning, match="the scale of its dimension 'a' is 0; the field holds the stored"):
+        cloud = cloud_of(tmp_path, with_extra(ROWS, record))
+    np.testing.assert_array_equal(cloud.fields["a"], ROWS[:, 0])
+
+
+def test_a_record_of_extra_bytes_that_is_cut_off(tmp_path: Path) -> None:
+    record = described(b"a", 3) + described(b"b", 3)[:-10]
+    with pytest.warns(
+        UserWarning, match="a record of extra bytes has 374 bytes, which is no multiple of 192"
+    ):
+        cloud = cloud_of(tmp_path, with_extra(ROWS, record))
+    np.testing.assert_array_equal(cloud.fields["a"], ROWS[:, 0])
+
+
+# Compression.
+
+
+def laszip_record(content: bytes | bytearray) -> int:
+    return content.index(b"laszip encoded") + 52
+
+
+@pytest.mark.parametrize("point_format", [3, 6])
+@pytest.mark.parametrize("compressor", [0, 4, 9])
+def test_a_compressor_that_nobody_knows(tmp_path: Path, point_format: int, compressor: int) -> None:
+    content = las(point_format, compressed=True)
+    message = rf"by LASzip 2\.2\.0 with compressor {compressor}, which cannot be decoded \(only 1, 2, 3 can"
+    refused(tmp_path, patched(content, (laszip_record(content), "H", compressor)), message)
+
+
+@pytest.mark.parametrize(
+    ("point_format", "name", "known"), [(3, "Point10", "1 and 2"), (6, "Point14", "3 and 4")]
+)
+def test_an_item_version_that_nobody_knows(tmp_path: Path, point_format: int, name: str, known: str) -> None:
+    content = las(point_format, compressed=True)
+    message = rf"with version 7 of {name}, which cannot be decoded \(only {known} can"
+    refused(tmp_path, patched(content, (laszip_record(content) + 38, "H", 7)), message)
+
+
+def test_a_chunk_table_of_another_version(tmp_path: Path) -> None:
+    content = las(compressed=True)
+    (start,) = struct.unpack_from("<I", content, 96)
+    (table,) = struct.unpack_from("<q", content, start)
+    message = r"the table of its LAZ chunks has version 5, which cannot be read \(only 0 can"
+    refused(tmp_path, patched(content, (table, "I", 5)), message)
+
+
+@pytest.mark.parametrize("kind", range(6))
+@pytest.mark.parametrize("compressed", [False, True])
+def test_legacy_point_formats_in_las_14(tmp_path: Path, kind: int, compressed: bool) -> None:
+    with no_warning():
+        cloud = cloud_of(tmp_path, las(kind, "1.4", compressed=compressed))
+    assert_whole(cloud)
+    assert {"synthetic", "withheld"} <= cloud.fields.keys()
+    assert ("wavepacket_index" in cloud.fields) == (kind in (4, 5))
