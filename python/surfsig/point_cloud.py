@@ -80,7 +80,8 @@ class PointCloud:
         point's own is the one that its field ``scan`` numbers, from 0. None for any other cloud.
     fields
         Further values per point, (n,) or (n, k), by name and in the file's order. Colours are ``red``,
-        ``green``, ``blue`` (and ``alpha``), uint8.
+        ``green``, ``blue`` (and ``alpha``): uint8 of 0 to 255, uint16 of 0 to 65535, or floating point where
+        they are neither, or missing in places.
     grid
         (height, width) of an organised cloud, whose points come row by row; None for any other.
 
@@ -172,7 +173,7 @@ class PointCloud:
 
         Returns
         -------
-        The fields nx, ny, nz are its normals, and red, green, blue (uint8) its colours. It knows no
+        The fields nx, ny, nz are its normals, and red, green, blue (uint8 or uint16) its colours. It knows no
         viewpoint and no grid.
 
         Raises

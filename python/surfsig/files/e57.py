@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from surfsig import _surfsig
 from surfsig.errors import FileFormatError, InvalidInputError
+from surfsig.files.colours import with_colours
 from surfsig.files.e57_names import field_names
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
@@ -54,7 +55,7 @@ def read(file: BinaryIO, source: str, progress: Progress, scan: int | None = Non
 def _scan(reader: _surfsig.E57Reader, number: int, source: str) -> PointCloud:
     columns, pose = reader.scan(number)
     points = _points(columns, f"{source}: scan {number}")
-    fields = {field: columns[name] for name, field in field_names(columns).items()}
+    fields = with_colours({field: columns[name] for name, field in field_names(columns).items()})
     viewpoint = None
     if pose is not None:
         rotation, viewpoint = _rotation(pose[0], source), np.array(pose[1])

@@ -13,7 +13,8 @@ from laspy import LasHeader, PackedPointRecord
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
-from surfsig.files.columns import blocks_of, with_colours
+from surfsig.files.colours import with_colours
+from surfsig.files.columns import blocks_of
 from surfsig.files.laz_chunks import PIECE_BYTES, copc_chunks, decoded, laz_chunks, one_line_errors
 from surfsig.files.options import inside
 from surfsig.files.progress import Progress
@@ -77,9 +78,8 @@ def read(
                 if name in told["dimensions"] or not _is_empty_dimension(name, values, header)
             }
         grid = told.get("grid") if box is None else None
-        return PointCloud(
-            offsets, origin, told.get("viewpoint"), with_colours(fields), tuple(grid) if grid else None
-        )
+        fields = with_colours(fields, bytes_in_16_bits=True)
+        return PointCloud(offsets, origin, told.get("viewpoint"), fields, tuple(grid) if grid else None)
 
 
 class _Columns:

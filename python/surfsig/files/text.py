@@ -29,6 +29,7 @@ from surfsig.point_cloud import PointCloud
 _HEAD_BYTES = 1 << 16
 # Maple writes a list of points as "Points:=[", then "[x, y, z], " per line, then "];".
 _MAPLE = re.compile(r"\w+\s*:=\s*\[\s*$")
+_DECIMAL = re.compile(r"[.eE]")
 _BRACKETS = str.maketrans("[],;", "    ")
 
 
@@ -46,12 +47,15 @@ class Layout:
         Lines before the first point.
     brackets
         The numbers stand in Maple's brackets.
+    decimals
+        The columns whose first number is written with a decimal point or an exponent.
     """
 
     names: list[str]
     delimiter: str | None
     skip: int
     brackets: bool
+    decimals: list[str]
 
 
 def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
@@ -76,7 +80,9 @@ def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
         for block in _without_bad_end(line_blocks(file, 1, progress), layout, source)
     ]
     table = np.concatenate(blocks)
-    return cloud_from_columns({name: table[:, i] for i, name in enumerate(layout.names)}, source=source)
+    return cloud_from_columns(
+        {name: table[:, i] for i, name in enumerate(layout.names)}, source=source, decimals=layout.decimals
+    )
 
 
 def _decoded(file: BinaryIO) -> BinaryIO:
@@ -105,10 +111,13 @@ def _layout(head: bytes, source: str) -> Layout:
             continue
         text = line.translate(_BRACKETS) if brackets else line
         delimiter = next((mark for mark in ";," if mark in text), None)
-        width = len(tokens_of(text, delimiter))
+        tokens = tokens_of(text, delimiter)
+        width = len(tokens)
         wrong = fault(text, width, delimiter, comments=True)
         if wrong is None and width >= 3:
-            return Layout(_names(header, comment, width), delimiter, number, brackets)
+            names = _names(header, comment, width)
+            decimals = [name for name, token in zip(names, tokens, strict=True) if _DECIMAL.search(token)]
+            return Layout(names, delimiter, number, brackets, decimals)
         cut_off = number == len(lines) - 1 and not head.endswith(b"\n")
         if header or brackets or wrong is None or cut_off:
             reason = wrong[0] if wrong else f"{width} values where a point needs three"
