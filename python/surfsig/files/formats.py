@@ -23,6 +23,7 @@ from surfsig.files import (
     pcd,
     pcd_write,
     ply,
+    ply_header,
     stl,
     text,
 )
@@ -152,7 +153,7 @@ _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
 # The order matters: text comes last, because every PCD header and every HTML page is text as well; before it
 # those that have no mark of their own.
 FORMATS = (
-    Format("PLY", (".ply",), _matches(ply.MAGIC), ply.read, ply.write),
+    Format("PLY", (".ply",), _matches(ply_header.MAGIC), ply.read, ply.write, takes=("samples",)),
     Format("PCD", (".pcd",), _matches(pcd.MAGIC), pcd.read, pcd_write.write, reserved=pcd_write.RESERVED),
     Format("NPY", (".npy",), _begins(numpy_files.NPY_MAGIC), numpy_files.read_npy),
     Format(
