@@ -28,6 +28,7 @@ from surfsig.files import (
     text,
 )
 from surfsig.files.columns import Chunks
+from surfsig.files.encodings import UTF16_MARKS, decoded_head
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
@@ -70,6 +71,11 @@ class Look(NamedTuple):
     head: bytes
     extension: str
     size: int
+
+    @property
+    def text(self) -> bytes:
+        """The head of a text, without a byte order mark and in UTF-8."""
+        return decoded_head(self.head)
 
 
 @dataclass(frozen=True)
@@ -117,7 +123,7 @@ def _matches(pattern: re.Pattern[bytes]) -> Callable[[Look], bool]:
 
 def _is_text(look: Look) -> bool:
     # UTF-16 begins with its mark; any other text has no zero and hardly a control character.
-    if look.head.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if look.head.startswith(UTF16_MARKS):
         return True
     controls = sum(byte < 9 or 13 < byte < 32 for byte in look.head)
     return 0 not in look.head and controls * 50 <= len(look.head)
@@ -130,7 +136,7 @@ def _is_binary_stl(look: Look) -> bool:
 
 
 def _is_obj(look: Look) -> bool:
-    return _is_text(look) and (look.extension == ".obj" or obj.MAGIC.match(look.head) is not None)
+    return _is_text(look) and (look.extension == ".obj" or obj.MAGIC.match(look.text) is not None)
 
 
 def _is_kitti(look: Look) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
 from surfsig.files.columns import cloud_from_columns
+from surfsig.files.encodings import decoded
 from surfsig.files.lines import (
     Block,
     content,
@@ -71,7 +71,7 @@ def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
     FileFormatError
         Naming the first line that cannot be understood.
     """
-    file = _decoded(file)
+    file = decoded(file)
     start = file.tell()
     layout = _layout(file.read(_HEAD_BYTES), source)
     file.seek(start)
@@ -83,16 +83,6 @@ def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
     return cloud_from_columns(
         {name: table[:, i] for i, name in enumerate(layout.names)}, source=source, decimals=layout.decimals
     )
-
-
-def _decoded(file: BinaryIO) -> BinaryIO:
-    """Skip a byte order mark; turn UTF-16, which some Windows programs write, into bytes of one per digit."""
-    mark = file.read(3)
-    if mark.startswith((b"\xff\xfe", b"\xfe\xff")):
-        file.seek(0)
-        return io.BytesIO(file.read().decode("utf-16", errors="replace").encode())
-    file.seek(3 if mark == b"\xef\xbb\xbf" else 0)
-    return file
 
 
 def _layout(head: bytes, source: str) -> Layout:
