@@ -66,10 +66,11 @@ def with_colours(
     parts = {channel: name for name, channel in named.items()}
     if len(parts) < len(named) or not parts.keys() >= set(CHANNELS):
         return dict(fields)
+    groups: list[tuple[str, ...]] = [CHANNELS, (ALPHA,)] if ALPHA in parts else [CHANNELS]
+    if decimals is not None and len(groups) > 1 and _is_one_scale([fields[name] for name in named]):
+        groups = [(*CHANNELS, ALPHA)]
     converted: dict[str, NDArray[Any]] = {}
-    for group in (CHANNELS, (ALPHA,)):
-        if not parts.keys() >= set(group):
-            continue
+    for group in groups:
         names = [parts[channel] for channel in group]
         values = [fields[name] for name in names]
         if decimals is None:
@@ -80,6 +81,11 @@ def with_colours(
             return dict(fields)
         converted.update(zip(names, found, strict=True))
     return {named.get(name, name): converted.get(name, values) for name, values in fields.items()}
+
+
+def _is_one_scale(values: Sequence[NDArray[Any]]) -> bool:
+    """Tell whether numbers of a text are all whole, or all at most 1: then alpha is on the colours' scale."""
+    return all(_are_whole(part) for part in values) or _limits(values)[1] <= 1
 
 
 def _of_type(values: Sequence[NDArray[Any]], bytes_in_16_bits: bool) -> Sequence[NDArray[Any]] | None:
@@ -105,7 +111,7 @@ def _of_type(values: Sequence[NDArray[Any]], bytes_in_16_bits: bool) -> Sequence
 def _of_text(values: Sequence[NDArray[Any]], decimal: bool, source: str) -> Sequence[NDArray[Any]] | None:
     """Do the same for numbers that were read as floating point, whatever they were in the text."""
     low, high = _limits(values)
-    if any(not np.array_equal(part, np.floor(part), equal_nan=True) for part in values):
+    if not all(_are_whole(part) for part in values):
         return _of_type(values, bytes_in_16_bits=False)
     if decimal and low >= 0 and high <= 1:
         return _of_type(values, bytes_in_16_bits=False)
@@ -126,6 +132,10 @@ def _whole(values: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]] | None:
         if low >= 0 and high <= np.iinfo(kind).max:
             return [part.astype(kind, copy=False) for part in values]
     return None
+
+
+def _are_whole(values: NDArray[Any]) -> bool:
+    return np.array_equal(values, np.floor(values), equal_nan=True)
 
 
 def _limits(values: Sequence[NDArray[Any]]) -> tuple[float, float]:

@@ -19,6 +19,7 @@ from surfsig.files import (
     kitti,
     numpy_files,
     obj,
+    off,
     parquet,
     pcd,
     pcd_write,
@@ -139,6 +140,11 @@ def _is_obj(look: Look) -> bool:
     return _is_text(look) and (look.extension == ".obj" or obj.MAGIC.match(look.text) is not None)
 
 
+def _is_off(look: Look) -> bool:
+    word_left_out = look.extension == ".off" and off.COUNTS_ALONE.match(look.text) is not None
+    return word_left_out or off.MAGIC.match(look.text) is not None
+
+
 def _is_kitti(look: Look) -> bool:
     return look.extension == ".bin" and not _is_text(look) and kitti.is_plausible(look.head, look.size)
 
@@ -192,6 +198,7 @@ FORMATS = (
     # A binary file may begin with "solid" too.
     Format("STL", (".stl",), _is_binary_stl, stl.read_binary, takes=("samples",)),
     Format("ASCII STL", (".stl",), _matches(stl.ASCII_MAGIC), stl.read_ascii, takes=("samples",)),
+    Format("OFF", (".off",), _is_off, off.read, takes=("samples",)),
     Format("KITTI", (".bin",), _is_kitti, kitti.read),
     Format("OBJ", (".obj",), _is_obj, obj.read, takes=("samples",)),
     Format("text", (".xyz", ".csv", ".txt", ".asc"), _is_text, text.read),
