@@ -16,6 +16,7 @@ from surfsig.files import (
     depth_image,
     e57,
     e57_writer,
+    gltf,
     kitti,
     numpy_files,
     obj,
@@ -145,6 +146,11 @@ def _is_off(look: Look) -> bool:
     return word_left_out or off.MAGIC.match(look.text) is not None
 
 
+def _is_gltf(look: Look) -> bool:
+    text = look.text.lstrip()
+    return text.startswith(b"{") and (look.extension == ".gltf" or b'"asset"' in text)
+
+
 def _is_kitti(look: Look) -> bool:
     return look.extension == ".bin" and not _is_text(look) and kitti.is_plausible(look.head, look.size)
 
@@ -192,12 +198,13 @@ FORMATS = (
     Format("JPEG image", (".jpg", ".jpeg"), _begins(b"\xff\xd8\xff")),
     Format("PDF", (".pdf",), _begins(b"%PDF")),
     Format("gzip archive", (".gz",), _begins(b"\x1f\x8b")),
-    Format("binary glTF", (".glb",), _begins(b"glTF")),
+    Format("GLB", (".glb",), _begins(gltf.GLB_MAGIC), gltf.read, takes=("samples",)),
     Format("HDF5", (".h5", ".hdf5"), _begins(b"\x89HDF")),
     Format("web page or XML", (".html", ".htm", ".xml"), _matches(_HTML)),
     # A binary file may begin with "solid" too.
     Format("STL", (".stl",), _is_binary_stl, stl.read_binary, takes=("samples",)),
     Format("ASCII STL", (".stl",), _matches(stl.ASCII_MAGIC), stl.read_ascii, takes=("samples",)),
+    Format("glTF", (".gltf",), _is_gltf, gltf.read, takes=("samples",)),
     Format("OFF", (".off",), _is_off, off.read, takes=("samples",)),
     Format("KITTI", (".bin",), _is_kitti, kitti.read),
     Format("OBJ", (".obj",), _is_obj, obj.read, takes=("samples",)),
