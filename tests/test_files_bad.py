@@ -128,7 +128,7 @@ def test_a_wrong_extension_does_not_matter(tmp_path: Path, name: str) -> None:
 def test_missing_file_and_folder(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         read(tmp_path / "none.ply")
-    with pytest.raises(IsADirectoryError):
+    with pytest.raises(FileFormatError, match="holds no files"):
         read(tmp_path)
 
 

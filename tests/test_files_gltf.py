@@ -16,13 +16,13 @@ from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files import format_name, read
 from surfsig.point_cloud import PointCloud
 
-SQUARE = np.float32([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
-UP = np.float32([[0, 0, 1]] * 4)
+SQUARE = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]], np.float32)
+UP = np.array([[0, 0, 1]] * 4, np.float32)
 COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 
 
 def scene(
-    arrays: dict[str, NDArray[Any]], primitives: Any = None, nodes: Any = None, **more: Any
+    arrays: dict[str, Any], primitives: Any = None, nodes: Any = None, **more: Any
 ) -> tuple[dict[str, Any], bytes]:
     """A document and its buffer: an accessor for each array, one mesh, and nodes that show it."""
     data, views, accessors = b"", [], []
@@ -88,7 +88,7 @@ def stacked(cloud: PointCloud, names: str) -> NDArray[Any]:
     return np.column_stack([cloud.fields[name] for name in names.split()])
 
 
-FACES = {"POSITION": SQUARE, "NORMAL": UP, "indices": np.array([0, 1, 2, 0, 2, 3], "<u2")}
+FACES: dict[str, Any] = {"POSITION": SQUARE, "NORMAL": UP, "indices": np.array([0, 1, 2, 0, 2, 3], "<u2")}
 
 
 @pytest.mark.parametrize(("make", "kind"), [(glb, "GLB"), (gltf, "glTF")])
@@ -150,8 +150,8 @@ def test_nodes_move_what_they_show(tmp_path: Path) -> None:
 
 
 def test_normals_turn_with_scaled_surfaces(tmp_path: Path) -> None:
-    corners = np.float32([[0, 0, 0], [1, 1, 0], [0, 0, 1]])
-    normal = np.float32([[0.5**0.5, -(0.5**0.5), 0]] * 3)
+    corners = np.array([[0, 0, 0], [1, 1, 0], [0, 0, 1]], np.float32)
+    normal = np.array([[0.5**0.5, -(0.5**0.5), 0]] * 3, np.float32)
     nodes = [{"mesh": 0, "scale": [1, 3, 1]}]
     cloud = quiet(save(tmp_path, glb(*scene({"POSITION": corners, "NORMAL": normal}, nodes=nodes))))
     np.testing.assert_allclose(stacked(cloud, "nx ny nz")[0], np.array([3, -1, 0]) / 10**0.5, atol=1e-6)
@@ -160,10 +160,10 @@ def test_normals_turn_with_scaled_surfaces(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("values", "expected", "dtype"),
     [
-        (np.uint8([[0, 1, 255]]), [0, 1, 255], np.uint8),
-        (np.uint16([[0, 1, 65535]]), [0, 1, 65535], np.uint16),
-        (np.float32([[0, 0.2, 1]]), [0, 51, 255], np.uint8),
-        (np.float32([[0, 0.2, 1, 0.6]]), [0, 51, 255, 153], np.uint8),
+        (np.array([[0, 1, 255]], np.uint8), [0, 1, 255], np.uint8),
+        (np.array([[0, 1, 65535]], np.uint16), [0, 1, 65535], np.uint16),
+        (np.array([[0, 0.2, 1]], np.float32), [0, 51, 255], np.uint8),
+        (np.array([[0, 0.2, 1, 0.6]], np.float32), [0, 51, 255, 153], np.uint8),
     ],
 )
 def test_colours(tmp_path: Path, values: NDArray[Any], expected: list[int], dtype: type) -> None:
@@ -175,7 +175,7 @@ def test_colours(tmp_path: Path, values: NDArray[Any], expected: list[int], dtyp
 
 
 def test_quantised_positions(tmp_path: Path) -> None:
-    quantised = np.int16([[0, 32767, -32768], [16384, -1, 1]])
+    quantised = np.array([[0, 32767, -32768], [16384, -1, 1]], np.int16)
     document, data = scene({"POSITION": quantised}, extensionsRequired=["KHR_mesh_quantization"])
     expected = np.maximum(quantised / 32767, -1).astype(np.float32)
     np.testing.assert_array_equal(quiet(save(tmp_path, glb(document, data))).points, expected)
@@ -186,7 +186,7 @@ def test_quantised_positions(tmp_path: Path) -> None:
 def test_interleaved_and_sparse_accessors(tmp_path: Path) -> None:
     rows = np.zeros(4, [("POSITION", "<f4", 3), ("NORMAL", "<f4", 3)])
     rows["POSITION"], rows["NORMAL"] = SQUARE, UP
-    places, others = np.array([1, 3], "<u2"), np.float32([[9, 8, 7], [6, 5, 4]])
+    places, others = np.array([1, 3], "<u2"), np.array([[9, 8, 7], [6, 5, 4]], np.float32)
     data = rows.tobytes() + places.tobytes() + others.tobytes()
     document, _ = scene(FACES)
     document["bufferViews"] = [
@@ -225,7 +225,7 @@ def test_triangles_strips_and_fans(tmp_path: Path, mode: int, indices: list[int]
             continue
         cloud = quiet(save(tmp_path, glb(*scene(arrays, primitives))), samples=400)
         assert (cloud.fields["nz"] == 1).all()
-        assert np.histogram2d(*cloud.points[:, :2].T, bins=2, range=[[0, 2]] * 2)[0].min() > 70
+        assert np.unique(cloud.points[:, :2] > 1, axis=0, return_counts=True)[1].min() > 70
 
 
 def test_parts_that_share_vertices_have_them_once(tmp_path: Path) -> None:
@@ -267,15 +267,17 @@ def test_skeletons_give_a_warning(tmp_path: Path) -> None:
 def test_a_scene_of_trimesh(tmp_path: Path) -> None:
     sphere, box = trimesh.creation.icosphere(subdivisions=2), trimesh.creation.box((1, 2, 3))
     sphere.visual.vertex_colors = np.random.default_rng(1).integers(0, 256, (len(sphere.vertices), 4))
-    whole = trimesh.Scene()
-    move = trimesh.transformations.euler_matrix(0.1, 0.2, 0.3)
+    whole: Any = trimesh.Scene()
+    transformations: Any = trimesh.transformations
+    move = transformations.euler_matrix(0.1, 0.2, 0.3)
     move[:3, 3] = 5, 6, 7
     whole.add_geometry(sphere, "sphere", transform=move)
     whole.add_geometry(box, "box")
     path = save(tmp_path, whole.export(file_type="glb"))
     with pytest.warns(UserWarning, match="are left out"):
         cloud = read(path)
-    reference: Any = trimesh.load(path, process=False).to_geometry()  # type: ignore[union-attr]
+    loaded: Any = trimesh.load(path, process=False)
+    reference = loaded.to_geometry()
     key = np.lexsort(np.round(cloud.points, 4).T)
     expected = reference.vertices[np.lexsort(np.round(reference.vertices, 4).T)]
     np.testing.assert_allclose(cloud.points[key], expected, atol=1e-5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -237,6 +238,13 @@ def of_content(path: Path, head: bytes, size: int) -> tuple[Format, Reader]:
             f"{path}: is not a {by_name.name} file, nor any other that can be read ({readable})"
         )
     raise FileFormatError(f"{path}: is no point cloud that can be read ({readable})")
+
+
+def of_file(path: Path) -> Format:
+    """Recognise a file, as `of_content` does."""
+    with path.open("rb") as file:
+        kind, _ = of_content(path, file.read(HEAD_BYTES), os.fstat(file.fileno()).st_size)
+    return kind
 
 
 def of_output(path: Path) -> tuple[Format, Writer]:

@@ -53,10 +53,10 @@ class Accessors:
             If there is no such accessor, it has another type than one of `types`, or its data are not there.
         """
         accessor = item(self._document, "accessors", index, self._source)
-        kind, count = accessor.get("type"), whole(accessor, "count", self._source)
+        kind, count = str(accessor.get("type")), whole(accessor, "count", self._source)
         if kind not in types or accessor.get("componentType") not in _COMPONENTS:
             raise FileFormatError(
-                f"{self._source}: broken: accessor {index} is of the type {str(kind)[:20]!r}, where "
+                f"{self._source}: broken: accessor {index} is of the type {kind[:20]!r}, where "
                 f"{' or '.join(types)} is expected"
             )
         dtype = np.dtype(_COMPONENTS[accessor["componentType"]])
@@ -174,9 +174,8 @@ class Accessors:
 def item(document: Mapping[str, Any], name: str, index: object, source: str) -> dict[str, Any]:
     """Give an object of one of the document's lists; a `FileFormatError` says if there is none."""
     objects = document.get(name)
-    known = isinstance(index, int) and not isinstance(index, bool)
-    if isinstance(objects, list) and known and 0 <= index < len(objects):  # type: ignore[operator]
-        found = objects[index]  # type: ignore[index]
+    if isinstance(objects, list) and isinstance(index, int) and 0 <= index < len(objects):
+        found = objects[index]
         if isinstance(found, dict):
             return found
     raise FileFormatError(f"{source}: broken: there is no number {str(index)[:20]} among its {name}")

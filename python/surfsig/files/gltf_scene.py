@@ -27,8 +27,8 @@ def shown_meshes(
     """
     roots = _roots(document, source)
     if roots is None:
-        for number in range(len(_list(document, "meshes"))):
-            yield number, np.eye(4), False
+        for mesh in range(len(_list(document, "meshes"))):
+            yield mesh, np.eye(4), False
         return
     waiting: list[tuple[object, NDArray[np.float64]]] = [(root, np.eye(4)) for root in reversed(roots)]
     seen: set[object] = set()
