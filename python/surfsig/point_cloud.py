@@ -15,6 +15,29 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
+def plain_array(values: ArrayLike) -> NDArray[Any]:
+    """Give an array without a mask: what NumPy's masked arrays hide is NaN.
+
+    Whole numbers of which some are masked become floating point, float32 where that holds them all (16 bits
+    or less). Where nothing is masked, the memory is the same.
+    """
+    if not isinstance(values, np.ma.MaskedArray):
+        return np.asarray(values)
+    if values.dtype.names:
+        parts = {name: plain_array(values[name]) for name in values.dtype.names}
+        dtype = [(name, part.dtype, part.shape[values.ndim :]) for name, part in parts.items()]
+        rows = np.empty(values.shape, dtype)
+        for name, part in parts.items():
+            rows[name] = part
+        return rows
+    if not np.ma.is_masked(values) or values.dtype.kind not in "fiub":
+        return np.asarray(values.data)
+    floating = values.dtype if values.dtype.kind == "f" else np.result_type(values.dtype, np.float32)
+    plain = values.data.astype(floating)
+    plain[np.ma.getmaskarray(values)] = np.nan
+    return plain
+
+
 def coordinate_array(points: ArrayLike, name: str = "points") -> NDArray[Any]:
     """Check coordinates and bring them into the form that the library works with.
 
@@ -24,7 +47,7 @@ def coordinate_array(points: ArrayLike, name: str = "points") -> NDArray[Any]:
     Parameters
     ----------
     points
-        (n, 3) numbers; NaN and infinity are allowed.
+        (n, 3) numbers; NaN and infinity are allowed. What a masked array hides is NaN.
     name
         What an error calls them.
 
@@ -39,7 +62,7 @@ def coordinate_array(points: ArrayLike, name: str = "points") -> NDArray[Any]:
         If the array is not (n, 3), or does not hold real numbers.
     """
     try:
-        array = np.asarray(points)
+        array = plain_array(points)
     except ValueError:
         raise InvalidInputError(f"{name} must be an (n, 3) array; its rows differ in length") from None
     if array.dtype.kind not in "fiu":
@@ -53,7 +76,7 @@ def coordinate_array(points: ArrayLike, name: str = "points") -> NDArray[Any]:
 def position_array(values: ArrayLike, name: str) -> NDArray[np.float64]:
     """Check one position, and return it as (3,) float64; an `InvalidInputError` says what `name` lacks."""
     try:
-        position = np.array(values, dtype=np.float64)
+        position = np.array(plain_array(values), dtype=np.float64)
     except (TypeError, ValueError):
         raise InvalidInputError(f"{name} must be three numbers") from None
     if position.shape != (3,) or not np.isfinite(position).all():
@@ -103,7 +126,7 @@ class PointCloud:
         self.origin = position_array(self.origin, "origin")
         if self.viewpoint is not None:
             self.viewpoint = position_array(self.viewpoint, "viewpoint")
-        self.fields = {str(name): np.asarray(values) for name, values in self.fields.items()}
+        self.fields = {str(name): plain_array(values) for name, values in self.fields.items()}
         for name, values in self.fields.items():
             if values.ndim not in (1, 2) or len(values) != len(self):
                 raise InvalidInputError(
@@ -138,7 +161,8 @@ class PointCloud:
             One of:
 
             - a `PointCloud`, which is returned itself;
-            - an array (n, 3) of any library that knows NumPy's protocols or DLPack (PyTorch, JAX, ...);
+            - an array (n, 3) of any library that knows NumPy's protocols or DLPack (PyTorch, JAX, ...); what
+              a masked array hides is NaN;
             - a structured array, pandas DataFrame or Arrow table (PyArrow, Polars, ...) with x, y, z in any
               case, or ``points`` (n, 3); the other columns of numbers become fields;
             - a point cloud of Open3D, legacy or tensor; normals become the fields nx, ny, nz, and colours

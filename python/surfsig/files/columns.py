@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
 from surfsig.files.colours import with_colours
-from surfsig.point_cloud import PointCloud
+from surfsig.point_cloud import PointCloud, plain_array
 
 # Coordinates printed as text and declared float32 stay float64 where float32 would move a point by more than
 # this share of the cloud's extent (many programs print UTM coordinates in full and declare them "float").
@@ -141,7 +141,7 @@ def output_columns(
     """
     new: dict[str, NDArray[Any]] = {}
     for name, values in (columns or {}).items():
-        array = np.asarray(values)
+        array = plain_array(values)
         if array.ndim not in (1, 2) or len(array) != len(cloud):
             raise InvalidInputError(
                 f"column '{name}' must have one row for each of the {len(cloud)} points, "
