@@ -17,6 +17,9 @@ from surfsig.point_cloud import PointCloud, plain_array
 # this share of the cloud's extent (many programs print UTM coordinates in full and declare them "float").
 LOSS_ALLOWED = 1e-6
 
+# What PCL, and Open3D in PCD, call normals.
+PCL_NORMALS = {"normal_x": "nx", "normal_y": "ny", "normal_z": "nz"}
+
 # What a `PointCloud` keeps as it is.
 _COORDINATES = (np.dtype("<f4"), np.dtype(">f4"), np.dtype("<f8"), np.dtype(">f8"))
 
@@ -111,7 +114,7 @@ def cloud_from_columns(
     return PointCloud(
         offsets,
         viewpoint=None if viewpoint is None else np.asarray(viewpoint, dtype=np.float64),
-        fields=with_colours(others, decimals=decimals, source=source),
+        fields=with_colours(_with_normals(others), decimals=decimals, source=source),
         grid=grid,
     )
 
@@ -317,6 +320,13 @@ def _shared_rows(x: NDArray[Any], y: NDArray[Any], z: NDArray[Any]) -> NDArray[A
     if (y.ctypes.data, z.ctypes.data) != (start + step, start + 2 * step):
         return None
     return np.lib.stride_tricks.as_strided(x, (len(x), 3), (3 * step, step), writeable=x.flags.writeable)
+
+
+def _with_normals(fields: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Call normals nx, ny, nz, also where they have PCL's names."""
+    if not PCL_NORMALS.keys() <= fields.keys() or set(PCL_NORMALS.values()) & fields.keys():
+        return fields
+    return {PCL_NORMALS.get(name, name): values for name, values in fields.items()}
 
 
 def _narrowed(offsets: NDArray[Any]) -> NDArray[Any]:

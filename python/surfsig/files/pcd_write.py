@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from surfsig.files.columns import Chunks, exact_float32, header_word, unique_name
+from surfsig.files.columns import PCL_NORMALS, Chunks, exact_float32, header_word, unique_name
 from surfsig.files.progress import Progress
 from surfsig.files.rows import write_rows
 from surfsig.point_cloud import PointCloud
@@ -75,9 +75,11 @@ def _header(cloud: PointCloud, fields: Mapping[str, Field], notes: Mapping[str, 
 
 
 def _fields(columns: Mapping[str, NDArray[Any]], reserved: tuple[str, ...]) -> dict[str, Field]:
-    """Name the fields of the columns; packed colours stand where red stood."""
+    """Name the fields of the columns; packed colours stand where red stood, normals have PCL's names."""
     colour = _packed_colour(columns)
     packed = () if colour is None else ("red", "green", "blue", "alpha")
+    there = all(name in columns and columns[name].ndim == 1 for name in PCL_NORMALS.values())
+    normals = {name: word for word, name in PCL_NORMALS.items()} if there else {}
     fields: dict[str, Field] = {}
     for name, values in columns.items():
         if colour is not None and name == "red":
@@ -86,7 +88,7 @@ def _fields(columns: Mapping[str, NDArray[Any]], reserved: tuple[str, ...]) -> d
             continue
         kind = _stored_type(values.dtype)
         count = values.shape[1] if values.ndim == 2 else 1
-        word = unique_name(header_word(name), {*fields, *reserved, *RESERVED})
+        word = unique_name(header_word(normals.get(name, name)), {*fields, *reserved, *RESERVED})
         fields[word] = Field(kind, count, [(kind, values)])
     return fields
 
