@@ -19,6 +19,7 @@ from typing import Any
 
 import laspy
 import lzf
+import meshes
 import numpy as np
 
 import surfsig
@@ -220,6 +221,7 @@ HAND_MADE: dict[str, tuple[Callable[[], bytes], dict[str, Any]]] = {
     "sampled.obj": (obj, {"samples": 50}),
     "binary.stl": (stl_binary, {}),
     "ascii.stl": (stl_ascii, {}),
+    **meshes.MADE,
     "depth.png": (depth_png, {"intrinsics": (10.0, 10.0, 6.0, 4.0)}),
     "kitti.bin": (lambda: ROWS.tobytes(), {}),
 }  # fmt: skip

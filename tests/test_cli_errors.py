@@ -49,8 +49,14 @@ def test_inputs(shell: Callable[..., Any], tmp_path: Path, content: bytes | None
     assert not (tmp_path / "o.ply").exists()
 
 
-def test_a_folder(shell: Callable[..., Any], tmp_path: Path) -> None:
-    assert "Is a directory" in one_line(shell("info", tmp_path))
+def test_an_empty_folder(shell: Callable[..., Any], tmp_path: Path) -> None:
+    assert f"{tmp_path}: holds no files" in one_line(shell("info", tmp_path))
+
+
+def test_a_pattern_that_matches_nothing(shell: Callable[..., Any], tmp_path: Path) -> None:
+    for command in (("info",), ("odometry", "-o", tmp_path / "a.txt")):
+        told = one_line(shell(*command, tmp_path / "scan_*.ply"))
+        assert f"{tmp_path / 'scan_*.ply'}: no file matches" in told
 
 
 @pytest.mark.parametrize("radius", ["0", "-1", "nan", "inf"])
@@ -75,7 +81,7 @@ def test_radii(shell: Callable[..., Any], ball: Path, tmp_path: Path, radius: st
         (("--radius", 1, "--box", "0,0,0,1,-1,1"), "box must be two corners"),
         (("--radius", 1, "--intrinsics", "1,2,3"), "'1,2,3' is not four numbers"),
         (("--radius", 1, "--scan", 0), "holds PLY data, for which 'scan' means nothing"),
-        (("--radius", 1, "--samples", 9), "for which 'samples' means nothing"),
+        (("--radius", 1, "--samples", 9), "has no faces, over which samples could be spread"),
         (("--radius", 1, "--intrinsics", "1,2,3,4"), "for which 'intrinsics' means nothing"),
         (("--radius", 1, "--depth-scale", 500), "for which 'depth_scale' means nothing"),
         (("--radius", 1, "--frobnicate"), "No such option"),

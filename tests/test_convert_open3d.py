@@ -158,3 +158,13 @@ def test_extract_takes_both_kinds() -> None:
     expected = surfsig.extract(points, 0.5)
     for made in (cloud.to_open3d(), cloud.to_open3d(tensor=True)):
         np.testing.assert_array_equal(surfsig.extract(made, 0.5).k1, expected.k1)
+
+
+def test_colours_of_16_bits() -> None:
+    colours = np.array([[0, 1, 65535]] * 4, np.uint16)
+    fields = dict(zip(("red", "green", "blue"), colours.T.copy(), strict=True))
+    cloud = PointCloud(POINTS, fields=fields)
+    np.testing.assert_allclose(np.asarray(cloud.to_open3d().colors), colours / 65535, rtol=1e-12)
+    back = PointCloud.of(cloud.to_open3d(tensor=True))
+    assert three(back, "red green blue").tolist() == colours.tolist()
+    assert back.fields["red"].dtype == np.uint16

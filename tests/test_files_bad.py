@@ -128,7 +128,7 @@ def test_a_wrong_extension_does_not_matter(tmp_path: Path, name: str) -> None:
 def test_missing_file_and_folder(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         read(tmp_path / "none.ply")
-    with pytest.raises(IsADirectoryError):
+    with pytest.raises(FileFormatError, match="holds no files"):
         read(tmp_path)
 
 
@@ -230,10 +230,6 @@ def test_absurd_counts_allocate_nothing(tmp_path: Path, name: str) -> None:
         (b"ply\nelement vertex 0\nend_header\n", "does not name a format"),
         (b"ply\nformat ascii 1.0\nelement vertex many\nend_header\n", "line 3 of the PLY header"),
         (b"ply\nformat ascii 1.0\nproperty float x\nend_header\n", "line 3 of the PLY header"),
-        (
-            b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float x\nend_header\n0 0\n",
-            "called 'x'",
-        ),
         (
             PLY_HEAD.format(data="ascii", n=2, more="").encode() + b"0 0 0\n0 nought 0\n",
             "line 9: 'nought' is not a number",

@@ -202,12 +202,6 @@ def assert_refused(path: Path, content: bytes | str, message: str) -> None:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (OBJ + "f 1 2 5\n", "line 9: a face refers to vertex 5, there are 4"),
-        ("v 1 2 3\nf -1 -2 -1\n", "line 2: a face refers to vertex -2, 1 are before it"),
-        (OBJ + "f 0 1 2\n", "line 9: a face refers to vertex 0"),
-        (OBJ + "f 1 2\n", "line 9: a face with 2 corners"),
-        (OBJ + "f 1 2 x\n", "line 9: 'x' is no number of a vertex"),
-        (OBJ + "f 1 2 " + "9" * 5000 + "\n", "is no number of a vertex"),
         (OBJ + "v 1 2\n", "line 9: 2 values where 3 are expected"),
         ("v 1 2\n", "line 1: 2 values where 3 are expected"),
         (OBJ + "v 1 2 nan\n", "a vertex is no number"),
@@ -220,6 +214,139 @@ def assert_refused(path: Path, content: bytes | str, message: str) -> None:
 )
 def test_broken_obj(tmp_path: Path, content: str, message: str) -> None:
     assert_refused(tmp_path / "a.obj", content, re.escape(message))
+
+
+BAD_FACES = ["f 1 2 5", "f -9 -2 -1", "f 0 1 2", "f 1 2", "f", "f 1 2 x", "f 1 2 " + "9" * 5000]
+
+
+@pytest.mark.parametrize("face", BAD_FACES)
+def test_obj_faces_that_are_none_are_left_out(tmp_path: Path, face: str) -> None:
+    path = save(tmp_path, "a.obj", OBJ + face + "\n" + "f 1 2 3 4\n")
+    told = "1 of 6 faces are left out, the first of which is number 5: they have fewer than three corners"
+    with pytest.warns(UserWarning, match=told) as warned:
+        cloud = read(path)
+    assert len(warned) == 1
+    np.testing.assert_array_equal(cloud.points, CORNERS)
+    with pytest.warns(UserWarning, match=told) as warned:
+        sampled = read(path, samples=100)
+    assert len(warned) == 1
+    whole = read(save(tmp_path, "b.obj", OBJ + "f 1 2 3 4\n"), samples=100)
+    np.testing.assert_array_equal(sampled.points, whole.points)
+
+
+@pytest.mark.filterwarnings("ignore:.*faces are left out")
+def test_obj_normals_do_not_count_where_a_face_names_a_wrong_one(tmp_path: Path) -> None:
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvn 0 1 0\nvn 1 0 0\nf 1//1 2//2 3//{}\n"
+    assert "nx" in read(save(tmp_path, "a.obj", text.format(3))).fields
+    for number in ("0", "9", "x"):
+        assert read(save(tmp_path, "a.obj", text.format(number))).fields == {}
+
+
+def test_odd_obj_faces(shared_data: Path) -> None:
+    folder = shared_data / "odd_files" / "obj_faces"
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    with pytest.warns(UserWarning, match="2 of 2 faces are left out"):
+        assert read(folder / "obj_bad_face.obj").points.tolist() == corners
+    assert read(folder / "obj_utf16.obj").points.tolist() == corners
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
+@pytest.mark.parametrize("name", ["a.obj", "a.dat"])
+def test_obj_in_encodings_of_windows(tmp_path: Path, encoding: str, name: str) -> None:
+    mark = "\ufeff" if encoding in ("utf-16-le", "utf-16-be") else ""
+    path = save(tmp_path, name, (mark + "# größer\r\n" + OBJ.replace("\n", "\r\n")).encode(encoding))
+    assert format_name(path) == "OBJ"
+    np.testing.assert_array_equal(read(path).points, CORNERS)
+    assert len(read(path, samples=10)) == 10
+
+
+def test_obj_colours_of_some_vertices(tmp_path: Path) -> None:
+    path = save(tmp_path, "a.obj", "v 1 2 3 1 0 0.5\nv 4 5 6\nv 7 8 9 0 1 0\n")
+    with pytest.warns(UserWarning, match="2 of 3 vertices have a colour; red, green and blue of the others"):
+        cloud = read(path)
+    np.testing.assert_array_equal(cloud.points, [[1, 2, 3], [4, 5, 6], [7, 8, 9]])
+    colours = np.column_stack([cloud.fields[name] for name in ("red", "green", "blue")])
+    np.testing.assert_array_equal(colours, [[1, 0, 0.5], [np.nan] * 3, [0, 1, 0]])
+
+
+def test_obj_colours_of_some_vertices_in_blocks_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("surfsig.files.lines.BLOCK_BYTES", 16)
+    path = save(tmp_path, "a.obj", "v 1 2 3\n" * 9 + "v 4 5 6 0 0.5 1\n" * 9 + "v 7 8 9 1\n" * 9)
+    with pytest.warns(UserWarning, match="9 of 27 vertices have a colour"):
+        cloud = read(path)
+    assert cloud.points[:, 0].tolist() == [1] * 9 + [4] * 9 + [7] * 9
+    assert np.isnan(cloud.fields["green"]).tolist() == [True] * 9 + [False] * 9 + [True] * 9
+    assert sorted(cloud.fields) == ["blue", "green", "red"]
+
+
+def test_obj_pure_colours_are_colours_from_0_to_1(tmp_path: Path) -> None:
+    cloud = read(save(tmp_path, "a.obj", "v 1 2 3 0 0 1\nv 1 2 3 1 0 1\n"))
+    assert [cloud.fields[name].tolist() for name in ("red", "green", "blue")] == [[0, 255], [0, 0], [255] * 2]
+
+
+def test_obj_weights(tmp_path: Path) -> None:
+    whole = read(save(tmp_path, "a.obj", "v 1 2 3 1\nv 4 5 6\nv 7 8 9 1.0\n"))
+    np.testing.assert_array_equal(whole.points, [[1, 2, 3], [4, 5, 6], [7, 8, 9]])
+    assert whole.fields == {}
+    path = save(tmp_path, "a.obj", "v 1 2 3 1\nv 4 5 6 2\nv 7 8 9\n")
+    with pytest.warns(UserWarning, match="weights of vertices are not used; they are the field 'w'"):
+        cloud = read(path)
+    np.testing.assert_array_equal(cloud.points, whole.points)
+    assert cloud.fields["w"].tolist() == [1, 2, 1]
+
+
+def test_obj_seven_numbers(tmp_path: Path) -> None:
+    alpha = read(save(tmp_path, "a.obj", "v 1 2 3 0 1 0 1\nv 4 5 6 1 0 0 0.6\n"))
+    assert [alpha.fields[name].tolist() for name in ("red", "green", "blue", "alpha")] == [
+        [0, 255], [255, 0], [0, 0], [255, 153],
+    ]  # fmt: skip
+    with pytest.warns(UserWarning, match="the first is 1: taken as weights and r, g, b"):
+        cloud = read(save(tmp_path, "a.obj", "v 1 2 3 1 0 0.2 0\nv 4 5 6 1 0.4 0 0.6\n"))
+    assert [values.tolist() for values in cloud.fields.values()] == [[0, 102], [51, 0], [0, 153]]
+    with pytest.warns(UserWarning, match="the first is 1: taken as r, g, b and alpha"):
+        cloud = read(save(tmp_path, "a.obj", "v 1 2 3 1 0 0.2 1\n"))
+    assert [int(values[0]) for values in cloud.fields.values()] == [255, 0, 51, 255]
+
+
+def test_obj_vertices_of_every_length(tmp_path: Path) -> None:
+    lengths = (3, 4, 5, 6, 7, 8, 12, 3)
+    lines = [f"v {i} 2 3{' 0.2' * (length - 3)}\n" for i, length in enumerate(lengths)]
+    path = save(tmp_path, "a.obj", "".join(lines) + "f 1 2 3\n")
+    with pytest.warns(UserWarning, match="vertices") as warned:
+        cloud = read(path)
+    told = [str(warning.message).partition(": ")[2] for warning in warned]
+    assert told == [
+        "numbers behind the coordinates of 3 vertices are left out: they are no weight and no colour",
+        "2 of 8 vertices have a colour; red, green and blue of the others are NaN",
+        "weights of vertices are not used; they are the field 'w'",
+    ]
+    np.testing.assert_array_equal(cloud.points, [[i, 2, 3] for i in range(8)])
+    assert cloud.fields["w"].tolist() == [1, 0.2, 1, 1, 1, 1, 1, 1]
+    with pytest.warns(UserWarning, match="of 2 vertices are left out"):
+        read(save(tmp_path, "b.obj", "v 1 2 3 4 5\n" * 2))
+    assert_refused(tmp_path / "c.obj", "".join(lines) + "v 1 2\n", "line 9: 2 values where 3 are expected")
+    assert_refused(tmp_path / "c.obj", "".join(lines) + "v 1 2 x 4\n", "line 9: 'x' is not a number")
+
+
+def test_obj_continuation_lines(tmp_path: Path) -> None:
+    text = "v 1 \\\n2 \\\n 3\nv 4 5 6\nv 7 8 \\\n9\nf 1 \\\n2 3\n"
+    np.testing.assert_array_equal(
+        read(save(tmp_path, "a.obj", text)).points, [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
+    )
+
+
+@pytest.mark.filterwarnings("ignore:.*numbers behind the coordinates")
+def test_obj_lines_of_any_length_need_no_more_memory(tmp_path: Path) -> None:
+    import tracemalloc
+
+    text = "v" + " 1" * 100_000 + "\n" + "v 1 2 3\n" * 20_000
+    path = save(tmp_path, "a.obj", text)
+    tracemalloc.start()
+    assert len(read(path)) == 20_001
+    assert tracemalloc.get_traced_memory()[1] < 60 * len(text)
+    tracemalloc.stop()
 
 
 def test_broken_stl(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfsig.errors import InvalidInputError
-from surfsig.point_cloud import coordinate_array
+from surfsig.point_cloud import coordinate_array, plain_array
 
 LENGTHS = (1e-18, 1e18)
 """What a radius or voxel may be: beyond, its square leaves float32."""
@@ -52,7 +52,7 @@ def query_places(
 ) -> tuple[NDArray[np.uint32] | NDArray[np.float64], NDArray[np.int64] | None]:
     """Return what the core takes, and the points' numbers where they are points."""
     try:
-        array = np.asarray(at)
+        array = plain_array(at)
     except ValueError:
         raise InvalidInputError("at must be places (m, 3); its rows differ in length") from None
     if array.ndim == 2:
@@ -65,7 +65,7 @@ def place_numbers(at: ArrayLike | None, count: int) -> NDArray[np.int64]:
     """Return numbers of places from numbers, of which negative ones count from the end, or a mask."""
     if at is None:
         return np.arange(count)
-    array = np.asarray(at)
+    array = plain_array(at)
     if array.dtype == np.bool_:
         if array.shape != (count,):
             raise InvalidInputError(f"at: a mask must have the shape ({count},), not {array.shape}")

@@ -16,6 +16,29 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
+def plain_array(values: ArrayLike) -> NDArray[Any]:
+    """Give an array without a mask: what NumPy's masked arrays hide is NaN.
+
+    Whole numbers of which some are masked become floating point, float32 where that holds them all (16 bits
+    or less). Where nothing is masked, the memory is the same.
+    """
+    if not isinstance(values, np.ma.MaskedArray):
+        return np.asarray(values)
+    if values.dtype.names:
+        parts = {name: plain_array(values[name]) for name in values.dtype.names}
+        dtype = [(name, part.dtype, part.shape[values.ndim :]) for name, part in parts.items()]
+        rows = np.empty(values.shape, dtype)
+        for name, part in parts.items():
+            rows[name] = part
+        return rows
+    if not np.ma.is_masked(values) or values.dtype.kind not in "fiub":
+        return np.asarray(values.data)
+    floating = values.dtype if values.dtype.kind == "f" else np.result_type(values.dtype, np.float32)
+    plain = values.data.astype(floating)
+    plain[np.ma.getmaskarray(values)] = np.nan
+    return plain
+
+
 def coordinate_array(points: ArrayLike, name: str = "points") -> NDArray[Any]:
     """Check coordinates and bring them into the form that the library works with.
 
@@ -25,7 +48,7 @@ def coordinate_array(points: ArrayLike, name: str = "points") -> NDArray[Any]:
     Parameters
     ----------
     points
-        (n, 3) numbers; NaN and infinity are allowed.
+        (n, 3) numbers; NaN and infinity are allowed. What a masked array hides is NaN.
     name
         What an error calls them.
 
@@ -40,7 +63,7 @@ def coordinate_array(points: ArrayLike, name: str = "points") -> NDArray[Any]:
         If the array is not (n, 3), or does not hold real numbers.
     """
     try:
-        array = np.asarray(points)
+        array = plain_array(points)
     except ValueError:
         raise InvalidInputError(f"{name} must be an (n, 3) array; its rows differ in length") from None
     if array.dtype.kind not in "fiu":
@@ -54,7 +77,7 @@ def coordinate_array(points: ArrayLike, name: str = "points") -> NDArray[Any]:
 def position_array(values: ArrayLike, name: str) -> NDArray[np.float64]:
     """Check one position, and return it as (3,) float64; an `InvalidInputError` says what `name` lacks."""
     try:
-        position = np.array(values, dtype=np.float64)
+        position = np.array(plain_array(values), dtype=np.float64)
     except (TypeError, ValueError):
         raise InvalidInputError(f"{name} must be three numbers") from None
     if position.shape != (3,) or not np.isfinite(position).all():
@@ -81,7 +104,8 @@ class PointCloud:
         point's own is the one that its field ``scan`` numbers, from 0. None for any other cloud.
     fields
         Further values per point, (n,) or (n, k), by name and in the file's order. Colours are ``red``,
-        ``green``, ``blue`` (and ``alpha``), uint8.
+        ``green``, ``blue`` (and ``alpha``): uint8 of 0 to 255, uint16 of 0 to 65535, or floating point where
+        they are neither, or missing in places.
     grid
         (height, width) of an organised cloud, whose points come row by row; None for any other.
     coordinate_system
@@ -107,7 +131,7 @@ class PointCloud:
         self.origin = position_array(self.origin, "origin")
         if self.viewpoint is not None:
             self.viewpoint = position_array(self.viewpoint, "viewpoint")
-        self.fields = {str(name): np.asarray(values) for name, values in self.fields.items()}
+        self.fields = {str(name): plain_array(values) for name, values in self.fields.items()}
         for name, values in self.fields.items():
             if values.ndim not in (1, 2) or len(values) != len(self):
                 raise InvalidInputError(
@@ -142,7 +166,8 @@ class PointCloud:
             One of:
 
             - a `PointCloud`, which is returned itself;
-            - an array (n, 3) of any library that knows NumPy's protocols or DLPack (PyTorch, JAX, ...);
+            - an array (n, 3) of any library that knows NumPy's protocols or DLPack (PyTorch, JAX, ...); what
+              a masked array hides is NaN;
             - a structured array, pandas DataFrame or Arrow table (PyArrow, Polars, ...) with x, y, z in any
               case, or ``points`` (n, 3); the other columns of numbers become fields;
             - a point cloud of Open3D, legacy or tensor; normals become the fields nx, ny, nz, and colours
@@ -177,7 +202,7 @@ class PointCloud:
 
         Returns
         -------
-        The fields nx, ny, nz are its normals, and red, green, blue (uint8) its colours. It knows no
+        The fields nx, ny, nz are its normals, and red, green, blue (uint8 or uint16) its colours. It knows no
         viewpoint and no grid.
 
         Raises

@@ -19,12 +19,14 @@ from surfsig.cli.options import CLOUD, input_options, quiet_option
 def convert_command(file: Path, output: Path, quiet: bool, **reading: Any) -> None:
     """Write the points of FILE to OUTPUT, in the format of its extension, with all their fields.
 
-    The viewpoint and the rows of an organised cloud are kept where the format can hold them.
+    The viewpoint and the rows of an organised cloud are kept where the format can hold them. FILE may be a
+    folder or a pattern: the points of all its files are then written to one.
 
     \b
     Examples:
       surfsig convert scan.xyz scan.ply
       surfsig convert part.ply part.npz --unit mm
+      surfsig convert 'tiles/*.laz' all.laz
       surfsig convert tile.copc.laz part.las --box 500100,4500200,0,500110,4500210,50
     """  # noqa: D301
     from surfsig.files import check_writable, read, write

@@ -19,10 +19,13 @@ from surfsig.cli.options import CLOUD, input_options, json_option
 def info_command(file: Path, as_json: bool, **reading: Any) -> None:
     """Show what a point cloud FILE holds, and how dense it is.
 
+    FILE may be a folder or a pattern, as for all commands: its files are then one cloud.
+
     \b
     Examples:
       surfsig info scan.ply
       surfsig info scan.pcd --json | jq .spacing
+      surfsig info 'tiles/*.laz'
       surfsig info tile.copc.laz --box 500100,4500200,0,500110,4500210,50
     """  # noqa: D301
     from surfsig.files import format_name, read

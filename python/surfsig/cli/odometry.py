@@ -56,14 +56,16 @@ def odometry_command(
 ) -> None:
     """Find the pose of each scan of a sequence: of SCANS, which are files, folders or ROS bags.
 
-    Nothing needs to be set. Scans are taken in the natural order of their names (2 before 10), or of the
-    messages. One that cannot be placed has a line of nan (KITTI) or none (TUM), and does not stop the rest.
-    TUM's timestamps are the messages', or the files' names where these are numbers.
+    Nothing needs to be set. A pattern stands for the files that it matches. Scans are taken in the natural
+    order of their names (2 before 10), or of the messages. One that cannot be placed has a line of nan
+    (KITTI) or none (TUM), and does not stop the rest. TUM's timestamps are the messages', or the files' names
+    where these are numbers.
 
     \b
     Examples:
       surfsig odometry scans/* -o trajectory.txt
       surfsig odometry scans/ -o trajectory.tum
+      surfsig odometry 'scans/scan_*.ply' -o trajectory.txt
       surfsig odometry drive.bag --topic /points -o trajectory.tum
     """  # noqa: D301
     import surfsig

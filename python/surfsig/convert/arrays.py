@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from surfsig.errors import InvalidInputError
 from surfsig.files.columns import cloud_from_columns, numeric_columns
-from surfsig.point_cloud import PointCloud
+from surfsig.point_cloud import PointCloud, plain_array
 
 # kDLCPU and kDLCUDAHost of dlpack.h: memory that the processor sees.
 _PROCESSOR_MEMORY = (1, 3)
@@ -44,7 +44,7 @@ def _processor_array(data: Any) -> NDArray[Any]:
         foreign = device not in (None, *_PROCESSOR_MEMORY)
         if foreign or (not speaks_numpy and hasattr(data, "__cuda_array_interface__")):
             raise InvalidInputError(f"{kind} lies on a GPU: copy it to the CPU first (PyTorch: x.cpu())")
-        array = np.asarray(data) if speaks_numpy or device is None else np.from_dlpack(data)
+        array = plain_array(data) if speaks_numpy or device is None else np.from_dlpack(data)
     except InvalidInputError:
         raise
     except (TypeError, ValueError, RuntimeError, BufferError) as error:

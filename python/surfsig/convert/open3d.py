@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from surfsig.convert.libraries import library
 from surfsig.errors import InvalidInputError
+from surfsig.files.colours import ALPHA, CHANNELS, with_colours
 from surfsig.files.columns import output_columns
 from surfsig.point_cloud import PointCloud
 
-_COLOURS = ("red", "green", "blue")
 _NORMALS = ("nx", "ny", "nz")
 
 
@@ -42,14 +42,14 @@ def point_cloud(cloud: PointCloud, *, tensor: bool) -> Any:
     o3d = library("open3d", "Open3D", "open3d")
     fields = output_columns(cloud, None, ("positions", "normals", "colors"))
     normals = _stack(fields, _NORMALS, "f")
-    colours = _stack(fields, _COLOURS, "u")
+    colours = _stack(fields, CHANNELS, "u")
     if not tensor:
         vectors = o3d.utility.Vector3dVector
         legacy = o3d.geometry.PointCloud(vectors(cloud.points.astype(np.float64, copy=False)))
         if normals is not None:
             legacy.normals = vectors(normals.astype(np.float64))
         if colours is not None:
-            legacy.colors = vectors(colours / 255.0)
+            legacy.colors = vectors(colours / float(np.iinfo(colours.dtype).max))
         return legacy
     geometry = o3d.t.geometry.PointCloud(_tensor(o3d, cloud.points))
     for name, values in (("normals", normals), ("colors", colours)):
@@ -69,13 +69,10 @@ def _fields(attributes: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
         elif name == "normals":
             fields.update(zip(_NORMALS, values.T, strict=True))
         elif name == "colors":
-            # Legacy colours, and a tensor's that are not whole numbers, run from 0 to 1.
-            if values.dtype != np.uint8:
-                values = np.round(np.clip(values, 0.0, 1.0) * 255.0).astype(np.uint8)
-            fields.update(zip((*_COLOURS, "alpha"), values.T, strict=False))
+            fields.update(zip((*CHANNELS, ALPHA), values.T.copy(), strict=False))
         else:
             fields[name] = values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values
-    return fields
+    return with_colours(fields)
 
 
 def _stack(fields: dict[str, NDArray[Any]], names: tuple[str, str, str], kind: str) -> NDArray[Any] | None:
@@ -83,7 +80,7 @@ def _stack(fields: dict[str, NDArray[Any]], names: tuple[str, str, str], kind: s
     parts = [fields[name] for name in names if name in fields]
     if len(parts) < 3 or any(part.ndim != 1 or part.dtype.kind != kind for part in parts):
         return None
-    if kind == "u" and any(part.dtype != np.uint8 for part in parts):
+    if kind == "u" and {part.dtype for part in parts} not in ({np.dtype(np.uint8)}, {np.dtype(np.uint16)}):
         return None
     for name in names:
         del fields[name]

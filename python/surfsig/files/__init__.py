@@ -10,6 +10,7 @@ import os
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,8 +20,10 @@ from surfsig.files import formats
 from surfsig.files.atomic import check_target, replacing
 from surfsig.files.columns import Chunks, output_columns
 from surfsig.files.options import box_array, check_unit, cropped, in_metres, metres_per
+from surfsig.files.paths import Paths, files_meant
 from surfsig.files.progress import Progress, ProgressCallback
 from surfsig.files.sequence import ScanSequence, TimedScan, scan_sequence
+from surfsig.files.several import read_several
 from surfsig.files.trajectory import (
     Trajectory,
     read_trajectory,
@@ -48,7 +51,7 @@ __all__ = [
 
 
 def read(
-    path: str | os.PathLike[str],
+    path: Paths,
     *,
     box: ArrayLike | None = None,
     unit: str | None = None,
@@ -60,13 +63,16 @@ def read(
 ) -> PointCloud:
     """Read a point cloud.
 
-    From PLY, PCD, LAS, LAZ, COPC, E57, text (XYZ, CSV, TXT, ASC), NPY, NPZ, Parquet, STL, OBJ, KITTI's .bin
-    or a depth image (PNG of 16 bits).
+    From PLY, PCD, LAS, LAZ, COPC, E57, text (XYZ, CSV, TXT, ASC), NPY, NPZ, Parquet, STL, OBJ, OFF, glTF and
+    GLB, KITTI's .bin or a depth image (PNG of 16 bits).
 
     Parameters
     ----------
     path
-        The file; its content, not its extension, decides how it is read.
+        The file; its content, not its extension, decides how it is read. Or several that make one cloud: a
+        folder (its files of the commonest extension), a pattern such as ``"scan/*.laz"`` (a file of this very
+        name comes first), both in the natural order of names (2 before 10), or an iterable of paths, in their
+        order; formats may differ.
     box
         Only the points in this box: (2, 3), its lowest and its highest corner, in the file's coordinates and
         unit; both belong to it. A COPC file is read no further than the box asks for.
@@ -76,7 +82,8 @@ def read(
     scan
         Of an E57 file with several scans, the one with this number, from 0; by default all of them.
     samples
-        Of a mesh (OBJ, STL), this many points spread evenly over its surface, in place of its vertices.
+        Of a mesh (OBJ, STL, PLY, OFF, glTF), this many points spread evenly over its surface, in place of
+        its vertices.
     intrinsics
         Of a depth image: (fx, fy, cx, cy) in pixels.
     depth_scale
@@ -88,13 +95,15 @@ def read(
     -------
     PointCloud
         Coordinates in the file's precision (text: float64), with all other values of its points as fields.
+        Of several files, with the fields that all have, and ``file``, each point's file, from 0; where each
+        has a viewpoint, ``scan`` numbers the `viewpoints`.
 
     Raises
     ------
     OSError
-        If the file is missing, a folder, or cannot be opened.
+        If the file is missing or cannot be opened, or no file matches a pattern.
     FileFormatError
-        If it is no point cloud, broken, or cut off.
+        If it is no point cloud, broken, or cut off; if a folder is empty. One bad file of several is enough.
     InvalidInputError
         If an option has no meaning, or none for this file's format.
 
@@ -102,8 +111,8 @@ def read(
     -----
     UserWarning
         If the last line of a text file is cut off (it is dropped) or may be, or values are left out that are
-        no numbers. If the coordinates are degrees, in two units, or not in the `unit` given. If the header
-        contradicts the file, and one of the two is clearly right.
+        no numbers, or that not all of several files have. If the coordinates are degrees, in two units, or
+        not in the `unit` given. If the header contradicts the file, and one of the two is clearly right.
 
     Notes
     -----
@@ -111,7 +120,14 @@ def read(
     differ in length also what follows the first that does); other files up to twice the cloud and more. A box
     or a unit makes a copy.
     """
-    path = Path(path)
+    files = files_meant(path)
+    if files is not None:
+        asked: dict[str, Any] = {
+            "box": box, "unit": unit, "scan": scan, "samples": samples, "intrinsics": intrinsics,
+            "depth_scale": depth_scale,
+        }  # fmt: skip
+        return read_several(files, lambda file, told: read(file, **asked, progress=told), progress)
+    path = Path(path)  # type: ignore[arg-type]
     corners = None if box is None else box_array(box)
     metres = None if unit is None else metres_per(unit)
     options = {
@@ -142,27 +158,25 @@ def read(
     return cloud if metres is None else in_metres(cloud, metres)
 
 
-def format_name(path: str | os.PathLike[str]) -> str:
+def format_name(path: Paths) -> str:
     """Say what format a file has by its content ("PLY", "text", ...).
 
     Parameters
     ----------
     path
-        The file.
+        The file, or several, as for `read`.
 
     Returns
     -------
-    The format's name.
+    The format's name; several, with commas between them, where files differ.
 
     Raises
     ------
     OSError, FileFormatError
         As `read`.
     """
-    path = Path(path)
-    with path.open("rb") as file:
-        kind, _ = formats.of_content(path, file.read(formats.HEAD_BYTES), os.fstat(file.fileno()).st_size)
-    return kind.name
+    files = files_meant(path) or [Path(path)]  # type: ignore[arg-type]
+    return ", ".join(dict.fromkeys(formats.of_file(file).name for file in files))
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:

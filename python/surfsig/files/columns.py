@@ -1,4 +1,4 @@
-"""Between the columns of a file and a `PointCloud`: names, colours and precision, for every format."""
+"""Between the columns of a file and a `PointCloud`: names and precision, for every format."""
 
 from __future__ import annotations
 
@@ -10,19 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
-from surfsig.point_cloud import PointCloud
+from surfsig.files.colours import with_colours
+from surfsig.point_cloud import PointCloud, plain_array
 
 # Coordinates printed as text and declared float32 stay float64 where float32 would move a point by more than
 # this share of the cloud's extent (many programs print UTM coordinates in full and declare them "float").
 LOSS_ALLOWED = 1e-6
 
+# What PCL, and Open3D in PCD, call normals.
+PCL_NORMALS = {"normal_x": "nx", "normal_y": "ny", "normal_z": "nz"}
+
 # What a `PointCloud` keeps as it is.
 _COORDINATES = (np.dtype("<f4"), np.dtype(">f4"), np.dtype("<f8"), np.dtype(">f8"))
-_COLOURS = {
-    prefix + letter: name
-    for name in ("red", "green", "blue", "alpha")
-    for prefix, letter in (("", name), ("", name[0]), ("diffuse_", name))
-}
 
 
 class Chunks(NamedTuple):
@@ -55,6 +54,7 @@ def cloud_from_columns(
     viewpoint: ArrayLike | None = None,
     grid: tuple[int, int] | None = None,
     declared_float32: bool = False,
+    decimals: Collection[str] | None = None,
     error: type[SurfsigError] = FileFormatError,
 ) -> PointCloud:
     """Make a cloud of named columns: x, y, z in any case, or `points` (n, 3); the others are its fields.
@@ -72,6 +72,9 @@ def cloud_from_columns(
     declared_float32
         The coordinates were parsed as float64 from text that declares float32: narrow them where that
         loses nothing that matters (see `LOSS_ALLOWED`).
+    decimals
+        Of text: the columns that are written with a decimal point, by which colours are told apart (see
+        `with_colours`). None where the file has types.
     error
         What is raised if a coordinate is missing or no number.
     """
@@ -115,7 +118,7 @@ def cloud_from_columns(
     return PointCloud(
         offsets,
         viewpoint=None if viewpoint is None else np.asarray(viewpoint, dtype=np.float64),
-        fields=with_colours(others),
+        fields=with_colours(_with_normals(others), decimals=decimals, source=source),
         grid=grid,
     )
 
@@ -145,7 +148,7 @@ def output_columns(
     """
     new: dict[str, NDArray[Any]] = {}
     for name, values in (columns or {}).items():
-        array = np.asarray(values)
+        array = plain_array(values)
         if array.ndim not in (1, 2) or len(array) != len(cloud):
             raise InvalidInputError(
                 f"column '{name}' must have one row for each of the {len(cloud)} points, "
@@ -278,20 +281,6 @@ def filled_columns(
     return columns
 
 
-def with_colours(fields: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Call colours red, green, blue and alpha, as uint8, where the values are whole numbers up to 255."""
-    named = {name: _COLOURS[name.lower()] for name in fields if name.lower() in _COLOURS}
-    colours = sorted(set(named.values()) - {"alpha"})
-    if len(set(named.values())) < len(named) or colours != ["blue", "green", "red"]:
-        return fields
-    if not all(_is_byte(fields[name]) for name in named):
-        return fields
-    return {
-        named.get(name, name): values.astype(np.uint8, copy=False) if name in named else values
-        for name, values in fields.items()
-    }
-
-
 def numeric_columns(rows: NDArray[Any], source: str) -> dict[str, NDArray[Any]]:
     """Give a structured array's (n,) fields of numbers, as (n, k) where they have further axes.
 
@@ -337,6 +326,13 @@ def _shared_rows(x: NDArray[Any], y: NDArray[Any], z: NDArray[Any]) -> NDArray[A
     return np.lib.stride_tricks.as_strided(x, (len(x), 3), (3 * step, step), writeable=x.flags.writeable)
 
 
+def _with_normals(fields: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Call normals nx, ny, nz, also where they have PCL's names."""
+    if not PCL_NORMALS.keys() <= fields.keys() or set(PCL_NORMALS.values()) & fields.keys():
+        return fields
+    return {PCL_NORMALS.get(name, name): values for name, values in fields.items()}
+
+
 def _narrowed(offsets: NDArray[Any]) -> NDArray[Any]:
     with np.errstate(over="ignore", invalid="ignore"):
         narrow = offsets.astype(np.float32)
@@ -358,12 +354,3 @@ def _split(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
     if array.ndim == 2 and name == "colors" and array.shape[1] in (3, 4):
         return dict(zip(("red", "green", "blue", "alpha"), array.T, strict=False))
     return {name: array}
-
-
-def _is_byte(values: NDArray[Any]) -> bool:
-    if values.ndim != 1:
-        return False
-    if values.dtype == np.uint8:
-        return True
-    with np.errstate(invalid="ignore"):
-        return bool(((values >= 0) & (values <= 255) & (values == np.floor(values))).all())

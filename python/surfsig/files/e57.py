@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from surfsig import _surfsig
 from surfsig.errors import FileFormatError, InvalidInputError
+from surfsig.files.colours import with_colours
 from surfsig.files.e57_names import field_names
+from surfsig.files.joined import common_viewpoints
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
@@ -54,7 +56,7 @@ def read(file: BinaryIO, source: str, progress: Progress, scan: int | None = Non
 def _scan(reader: _surfsig.E57Reader, number: int, source: str) -> PointCloud:
     columns, pose = reader.scan(number)
     points = _points(columns, f"{source}: scan {number}")
-    fields = {field: columns[name] for name, field in field_names(columns).items()}
+    fields = with_colours({field: columns[name] for name, field in field_names(columns).items()})
     viewpoint = None
     if pose is not None:
         rotation, viewpoint = _rotation(pose[0], source), np.array(pose[1])
@@ -149,11 +151,8 @@ def _joined(clouds: list[PointCloud]) -> PointCloud:
         missing = np.nan if kind.kind == "f" else 0
         parts = [cloud.fields.get(name, np.full(len(cloud), missing, kind)) for cloud in clouds]
         fields["input_scan" if name == "scan" else name] = np.concatenate(parts, dtype=kind)
-    viewpoint = viewpoints = None
-    places = [cloud.viewpoint for cloud in clouds if cloud.viewpoint is not None]
-    if len(places) == len(clouds):
-        viewpoints = np.stack(places)
-        if (viewpoints == viewpoints[0]).all():
-            viewpoint, viewpoints = viewpoints[0], None
+    viewpoint, viewpoints = common_viewpoints(
+        [None if cloud.viewpoint is None else cloud.viewpoint[None] for cloud in clouds]
+    )
     offsets = np.concatenate([cloud.offsets for cloud in clouds])
     return PointCloud(offsets, viewpoint=viewpoint, viewpoints=viewpoints, fields=fields)

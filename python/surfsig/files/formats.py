@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,18 +17,22 @@ from surfsig.files import (
     depth_image,
     e57,
     e57_writer,
+    gltf,
     kitti,
     numpy_files,
     obj,
+    off,
     parquet,
     pcd,
     pcd_header,
     pcd_write,
     ply,
+    ply_header,
     stl,
     text,
 )
 from surfsig.files.columns import Chunks
+from surfsig.files.encodings import UTF16_MARKS, decoded_head
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
@@ -70,6 +75,11 @@ class Look(NamedTuple):
     head: bytes
     extension: str
     size: int
+
+    @property
+    def text(self) -> bytes:
+        """The head of a text, without a byte order mark and in UTF-8."""
+        return decoded_head(self.head)
 
 
 @dataclass(frozen=True)
@@ -117,7 +127,7 @@ def _matches(pattern: re.Pattern[bytes]) -> Callable[[Look], bool]:
 
 def _is_text(look: Look) -> bool:
     # UTF-16 begins with its mark; any other text has no zero and hardly a control character.
-    if look.head.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if look.head.startswith(UTF16_MARKS):
         return True
     controls = sum(byte < 9 or 13 < byte < 32 for byte in look.head)
     return 0 not in look.head and controls * 50 <= len(look.head)
@@ -130,7 +140,17 @@ def _is_binary_stl(look: Look) -> bool:
 
 
 def _is_obj(look: Look) -> bool:
-    return _is_text(look) and (look.extension == ".obj" or obj.MAGIC.match(look.head) is not None)
+    return _is_text(look) and (look.extension == ".obj" or obj.MAGIC.match(look.text) is not None)
+
+
+def _is_off(look: Look) -> bool:
+    word_left_out = look.extension == ".off" and off.COUNTS_ALONE.match(look.text) is not None
+    return word_left_out or off.MAGIC.match(look.text) is not None
+
+
+def _is_gltf(look: Look) -> bool:
+    text = look.text.lstrip()
+    return text.startswith(b"{") and (look.extension == ".gltf" or b'"asset"' in text)
 
 
 def _is_kitti(look: Look) -> bool:
@@ -153,7 +173,7 @@ _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
 # The order matters: text comes last, because every PCD header and every HTML page is text as well; before it
 # those that have no mark of their own.
 FORMATS = (
-    Format("PLY", (".ply",), _matches(ply.MAGIC), ply.read, ply.write),
+    Format("PLY", (".ply",), _matches(ply_header.MAGIC), ply.read, ply.write, takes=("samples",)),
     Format(
         "PCD", (".pcd",), _matches(pcd_header.MAGIC), pcd.read, pcd_write.write, reserved=pcd_write.RESERVED
     ),
@@ -182,12 +202,14 @@ FORMATS = (
     Format("JPEG image", (".jpg", ".jpeg"), _begins(b"\xff\xd8\xff")),
     Format("PDF", (".pdf",), _begins(b"%PDF")),
     Format("gzip archive", (".gz",), _begins(b"\x1f\x8b")),
-    Format("binary glTF", (".glb",), _begins(b"glTF")),
+    Format("GLB", (".glb",), _begins(gltf.GLB_MAGIC), gltf.read, takes=("samples",)),
     Format("HDF5", (".h5", ".hdf5"), _begins(b"\x89HDF")),
     Format("web page or XML", (".html", ".htm", ".xml"), _matches(_HTML)),
     # A binary file may begin with "solid" too.
     Format("STL", (".stl",), _is_binary_stl, stl.read_binary, takes=("samples",)),
     Format("ASCII STL", (".stl",), _matches(stl.ASCII_MAGIC), stl.read_ascii, takes=("samples",)),
+    Format("glTF", (".gltf",), _is_gltf, gltf.read, takes=("samples",)),
+    Format("OFF", (".off",), _is_off, off.read, takes=("samples",)),
     Format("KITTI", (".bin",), _is_kitti, kitti.read),
     Format("OBJ", (".obj",), _is_obj, obj.read, takes=("samples",)),
     Format("text", (".xyz", ".csv", ".txt", ".asc"), _is_text, text.read),
@@ -219,6 +241,13 @@ def of_content(path: Path, head: bytes, size: int) -> tuple[Format, Reader]:
             f"{path}: is not a {by_name.name} file, nor any other that can be read ({readable})"
         )
     raise FileFormatError(f"{path}: is no point cloud that can be read ({readable})")
+
+
+def of_file(path: Path) -> Format:
+    """Recognise a file, as `of_content` does."""
+    with path.open("rb") as file:
+        kind, _ = of_content(path, file.read(HEAD_BYTES), os.fstat(file.fileno()).st_size)
+    return kind
 
 
 def of_output(path: Path) -> tuple[Format, Writer]:

@@ -12,7 +12,8 @@ from laspy import LasHeader, PackedPointRecord
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
-from surfsig.files.columns import blocks_of, with_colours
+from surfsig.files.colours import with_colours
+from surfsig.files.columns import blocks_of
 from surfsig.files.las_counts import LARGEST_HEADER, Held, agreed_count, end_of_points
 from surfsig.files.las_header import RECORD_ID, USER_ID, check_coordinates, read_header
 from surfsig.files.laz_chunks import PIECE_BYTES, Chunk, copc_chunks, decoded, laz_chunks, one_line_errors
@@ -81,7 +82,7 @@ def read(
             offsets,
             origin,
             told.get("viewpoint"),
-            with_colours(fields),
+            with_colours(fields, bytes_in_16_bits=True),
             tuple(grid) if grid else None,
             coordinate_system=coordinate_system,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import warnings
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,53 @@ def with_normals(points: NDArray[Any], normals: NDArray[Any]) -> PointCloud:
     """Make a cloud of points with normals (n, 3), which become the fields nx, ny, nz (float32)."""
     fields = dict(zip(("nx", "ny", "nz"), normals.astype(np.float32).T.copy(), strict=True))
     return PointCloud(points, fields=fields)
+
+
+def fans(lengths: NDArray[np.int64], corners: NDArray[np.int64], count: int, source: str) -> NDArray[np.intp]:
+    """Cut faces into triangles that share their face's first corner.
+
+    Parameters
+    ----------
+    lengths
+        (f,), how many corners each face has.
+    corners
+        Their vertices, from 0, face by face.
+    count
+        How many vertices there are.
+    source
+        The file's name, for the warning.
+
+    Returns
+    -------
+    numpy.ndarray
+        (t, 3).
+
+    Warns
+    -----
+    UserWarning
+        If faces are left out, which have fewer than three corners or refer to vertices that are missing.
+    """
+    ends = np.cumsum(lengths)
+    missing = np.flatnonzero((corners < 0) | (corners >= count))
+    whole = lengths >= 3
+    whole[np.searchsorted(ends, missing, side="right")] = False
+    warn_left_out(np.flatnonzero(~whole), len(lengths), source)
+    sizes = lengths[whole] - 2
+    # Of each triangle: where its face begins, and the how manieth of it it is.
+    begins = np.repeat((ends - lengths)[whole], sizes)
+    along = np.arange(len(begins)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    places = begins + along
+    return np.stack([corners[begins], corners[places + 1], corners[places + 2]], axis=1).astype(np.intp)
+
+
+def warn_left_out(faces: NDArray[np.intp], count: int, source: str) -> None:
+    """Say that faces are left out, if any are: `faces` has their numbers from 0."""
+    if len(faces):
+        warnings.warn(
+            f"{source}: {len(faces)} of {count} faces are left out, the first of which is number "
+            f"{faces[0] + 1}: they have fewer than three corners, or refer to vertices that are missing",
+            stacklevel=3,
+        )
 
 
 def merged(corners: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.intp]]:

@@ -10,7 +10,14 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from surfsig.files.columns import Chunks, blocks_of, exact_float32, header_word, unique_name
+from surfsig.files.columns import (
+    PCL_NORMALS,
+    Chunks,
+    blocks_of,
+    exact_float32,
+    header_word,
+    unique_name,
+)
 from surfsig.files.pcd_header import EXACT, NOTE, OWN_NOTES, PACKED_COLOURS
 from surfsig.files.progress import Progress
 from surfsig.files.rows import write_rows
@@ -138,9 +145,11 @@ def _header(
 
 
 def _fields(columns: Mapping[str, NDArray[Any]], reserved: tuple[str, ...]) -> dict[str, Field]:
-    """Name the fields of the columns; packed colours stand where red stood."""
+    """Name the fields of the columns; packed colours stand where red stood, normals have PCL's names."""
     colour = _packed_colour(columns)
     packed = () if colour is None else ("red", "green", "blue", "alpha")
+    there = all(name in columns and columns[name].ndim == 1 for name in PCL_NORMALS.values())
+    normals = {name: word for word, name in PCL_NORMALS.items()} if there else {}
     fields: dict[str, Field] = {}
     for name, values in columns.items():
         if colour is not None and name == "red":
@@ -149,7 +158,7 @@ def _fields(columns: Mapping[str, NDArray[Any]], reserved: tuple[str, ...]) -> d
             continue
         kind = _stored_type(values.dtype)
         count = values.shape[1] if values.ndim == 2 else 1
-        word = unique_name(header_word(name), {*fields, *reserved, *RESERVED})
+        word = unique_name(header_word(normals.get(name, name)), {*fields, *reserved, *RESERVED})
         fields[word] = Field(kind, count, [(kind, values)])
     return fields
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import os
-import re
+import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
+from surfsig.files import mesh
 from surfsig.files.columns import (
     Chunks,
     cloud_from_columns,
@@ -22,71 +22,44 @@ from surfsig.files.columns import (
     scalar_columns,
 )
 from surfsig.files.lines import take_rows
-from surfsig.files.ply_elements import Element, Property, element_blocks, skip_element
+from surfsig.files.ply_elements import element_blocks, skip_element
+from surfsig.files.ply_faces import Faces
+from surfsig.files.ply_header import read_header
 from surfsig.files.progress import Progress
 from surfsig.files.rows import write_rows
 from surfsig.point_cloud import PointCloud
 
-MAGIC = re.compile(rb"ply[ \t]*\r?\n")
-MAX_HEADER_BYTES = 1 << 20
-
-_TYPES = {
-    **dict.fromkeys(("char", "int8"), "i1"),
-    **dict.fromkeys(("uchar", "uint8"), "u1"),
-    **dict.fromkeys(("short", "int16"), "i2"),
-    **dict.fromkeys(("ushort", "uint16"), "u2"),
-    **dict.fromkeys(("int", "int32"), "i4"),
-    **dict.fromkeys(("uint", "uint32"), "u4"),
-    **dict.fromkeys(("float", "float32"), "f4"),
-    **dict.fromkeys(("double", "float64"), "f8"),
-}
 _NAMES = {
     "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort", "i4": "int", "u4": "uint", "f4": "float",
     "f8": "double",
 }  # fmt: skip
-_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+# Beyond it, double does not hold every whole number.
+_DOUBLE_HOLDS = 2**53
 
 
-@dataclass
-class Header:
-    """What stands before the data.
-
-    Attributes
-    ----------
-    order
-        ``<`` or ``>`` for binary data, empty for ASCII.
-    elements
-        In the order of the data.
-    notes
-        What this library wrote as comments ``surfsig KEY VALUE``.
-    lines
-        Number of lines, ``end_header`` included.
-    """
-
-    order: str | None = None
-    elements: list[Element] = field(default_factory=list)
-    notes: dict[str, str] = field(default_factory=dict)
-    lines: int = 0
-
-
-def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
+def read(file: BinaryIO, source: str, progress: Progress, samples: int | None = None) -> PointCloud:
     """Read the vertices of an open PLY file; other elements and list properties are skipped.
+
+    Of two properties with one name, the second is numbered (x_2), or left out if it is the same. With
+    `samples`, that many points spread over the faces, with the faces' normals.
 
     Raises
     ------
     FileFormatError
         If the header makes no sense, has no vertices, or promises more than the file holds.
+    InvalidInputError
+        If `samples` is no positive whole number, or there is no surface to spread them over.
+
+    Warns
+    -----
+    UserWarning
+        If a name occurs twice, the vertices have another name, or faces are left out.
     """
-    header = _read_header(file, source)
-    names = [element.name for element in header.elements]
-    if "vertex" not in names:
-        raise FileFormatError(f"{source}: a PLY file without vertices ({', '.join(names) or 'no element'})")
-    position = names.index("vertex")
-    before, vertex, after = (
-        header.elements[:position],
-        header.elements[position],
-        header.elements[position + 1 :],
-    )
+    header = read_header(file, source, os.fstat(file.fileno()).st_size)
+    position = header.vertex(source)
+    vertex = header.elements[position]
+    twice = vertex.rename_twice()
+    faces = None if samples is None else Faces.among(header.elements, position, source)
     size = os.fstat(file.fileno()).st_size - file.tell()
     least = sum(element.least_bytes(ascii=not header.order) for element in header.elements)
     if least > size + 1:
@@ -95,13 +68,16 @@ def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
             f"of data, {size} are there"
         )
     if header.order:
-        for element in before:
-            skip_element(file, element, source, progress)
-        blocks = element_blocks(file, vertex, source, progress)
-        columns = filled_columns(vertex.single_dtype(), vertex.count, blocks)
-        for element in after:
-            skip_element(file, element, source, progress)
+        for number, element in enumerate(header.elements):
+            if number == position:
+                blocks = element_blocks(file, vertex, source, progress)
+                columns = filled_columns(vertex.single_dtype(), vertex.count, blocks)
+            else:
+                lists = faces.lists if faces is not None and number == faces.position else None
+                skip_element(file, element, source, progress, lists=lists)
     else:
+        counts = [element.count for element in header.elements]
+        start = file.tell()
         rows = take_rows(
             file,
             vertex.ascii_dtype(),
@@ -109,19 +85,27 @@ def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
             source=source,
             first=header.lines + 1,
             progress=progress,
-            skip=sum(element.count for element in before),
-            after=sum(element.count for element in after),
+            skip=sum(counts[:position]),
+            after=sum(counts[position + 1 :]),
             select=vertex.without_lists if vertex.has_lists else None,
         )
         columns = columns_of(rows)
+        if faces is not None:
+            file.seek(start)
+            faces.take_lines(file, header.elements)
     axes = {item.dtype for item in vertex.properties if item.name.lower() in ("x", "y", "z")}
-    return cloud_from_columns(
-        columns,
+    cloud = cloud_from_columns(
+        _without_equal(columns, twice, source),
         source=source,
         viewpoint=_numbers(header.notes.get("viewpoint", ""), 3),
         grid=_grid(header.notes.get("grid", ""), vertex.count),
         declared_float32=not header.order and all(kind.endswith("f4") for kind in axes),
     )
+    if samples is None or faces is None:
+        return cloud
+    mesh.check_vertices(cloud.offsets, source)
+    triangles = mesh.fans(*faces.lists.joined(), len(cloud), source)
+    return mesh.sampled(cloud.offsets, triangles, samples, source)
 
 
 def write(
@@ -157,60 +141,39 @@ def write(
     write_rows(file, parts, tail, len(cloud), progress)
 
 
-def _read_header(file: BinaryIO, source: str) -> Header:
-    header = Header()
-    while True:
-        raw = file.readline(MAX_HEADER_BYTES)
-        header.lines += 1
-        if not raw.endswith(b"\n") or file.tell() > MAX_HEADER_BYTES:
-            raise FileFormatError(f"{source}: the PLY header does not end: the file is cut off or broken")
-        words = raw.decode("utf-8", errors="replace").split()
-        if words[:1] == ["end_header"]:
-            break
-        try:
-            _take_header_line(header, words)
-        except (ValueError, IndexError, KeyError):
-            text = " ".join(words)[:60]
-            raise FileFormatError(
-                f"{source}: line {header.lines} of the PLY header makes no sense: {text!r}"
-            ) from None
-    if header.order is None:
-        raise FileFormatError(f"{source}: the PLY header does not name a format")
-    for element in header.elements:
-        names = [item.name for item in element.properties]
-        if element.name == "vertex" and len(set(names)) < len(names):
-            twice = next(name for name in names if names.count(name) > 1)
-            raise FileFormatError(f"{source}: two properties of the vertices are called '{twice}'")
-    return header
+def _without_equal(
+    columns: dict[str, NDArray[Any]], twice: Mapping[str, str], source: str
+) -> dict[str, NDArray[Any]]:
+    """Leave out what stands in the file twice; `twice` has the names of second columns, and the file's."""
+    equal = {name for name, first in twice.items() if _same(columns, name, first)}
+    different = [name for name in twice if name in columns and name not in equal]
+    if different:
+        told = ", ".join(f"'{twice[name][:40]}'" for name in different[:3])
+        warnings.warn(
+            f"{source}: several properties of the vertices are called {told}; of each, the first keeps its "
+            f"name, the next is '{different[0][:40]}'",
+            stacklevel=3,
+        )
+    return {name: values for name, values in columns.items() if name not in equal}
 
 
-def _take_header_line(header: Header, words: list[str]) -> None:
-    match words:
-        case [] | ["ply"] | ["obj_info", *_]:
-            pass
-        case ["comment", "surfsig", key, *value]:
-            header.notes[key] = " ".join(value)
-        case ["comment", *_]:
-            pass
-        case ["format", name, _]:
-            header.order = _ORDERS[name]
-        case ["element", name, count] if int(count) >= 0:
-            header.elements.append(Element(name, int(count), []))
-        case ["property", "list", length, kind, name]:
-            if _TYPES[length].startswith("f"):
-                raise ValueError(length)
-            order = header.order or ""
-            header.elements[-1].properties.append(
-                Property(name, order + _TYPES[kind], order + _TYPES[length])
-            )
-        case ["property", kind, name]:
-            header.elements[-1].properties.append(Property(name, (header.order or "") + _TYPES[kind]))
-        case _:
-            raise ValueError(words)
+def _same(columns: Mapping[str, NDArray[Any]], name: str, first: str) -> bool:
+    if name not in columns or first not in columns:
+        return False
+    floating = {columns[name].dtype.kind, columns[first].dtype.kind} <= {"f"}
+    return np.array_equal(columns[name], columns[first], equal_nan=floating)
 
 
 def _stored_type(values: NDArray[Any]) -> str:
-    """Choose PLY's type for a column; 64-bit whole numbers that do not fit 32 bits become double."""
+    """Choose PLY's type for a column; 64-bit whole numbers that do not fit 32 bits become double.
+
+    There are no 64-bit whole numbers that every program reads.
+
+    Warns
+    -----
+    UserWarning
+        If double rounds them.
+    """
     kind = values.dtype.kind
     if kind == "b":
         return "u1"
@@ -222,6 +185,8 @@ def _stored_type(values: NDArray[Any]) -> str:
         limits = np.iinfo(name)
         if not values.size or (values.min() >= limits.min and values.max() <= limits.max):
             return name
+    if int(values.max()) > _DOUBLE_HOLDS or int(values.min()) < -_DOUBLE_HOLDS:
+        warnings.warn("PLY has no whole numbers of 64 bits: some are rounded to double", stacklevel=4)
     return "f8"
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections import Counter, deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import islice
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -16,6 +19,8 @@ from surfsig.files.rows import BLOCK_BYTES, filled
 
 # Rows that are looked at one by one before their numbers are taken.
 VISITED_ROWS = 4096
+# Digits that any length has fewer of.
+_LONGEST_NUMBER = 19
 
 
 @dataclass
@@ -50,6 +55,28 @@ class Element:
         """Whether rows may differ in size."""
         return any(item.length for item in self.properties)
 
+    @property
+    def has_coordinates(self) -> bool:
+        """Whether x, y and z are among its single numbers."""
+        return {*"xyz"} <= {item.name.lower() for item in self.properties if not item.length}
+
+    def rename_twice(self) -> dict[str, str]:
+        """Rename properties whose name is taken, x to x_2; give the file's name of each by the new one."""
+        taken = {item.name for item in self.properties}
+        seen: Counter[str] = Counter()
+        renamed: dict[str, str] = {}
+        for item in self.properties:
+            name = item.name
+            seen[name] += 1
+            if seen[name] == 1:
+                continue
+            while item.name in taken:
+                item.name = f"{name}_{seen[name]}"
+                seen[name] += item.name in taken
+            taken.add(item.name)
+            renamed[item.name] = name
+        return renamed
+
     def least_bytes(self, *, ascii: bool) -> int:
         """Give the fewest bytes that the data can have: every list empty, every number one digit."""
         if ascii:
@@ -74,10 +101,8 @@ class Element:
             token = next(tokens, "")
             if not item.length:
                 kept.append(token)
-            elif token.isdigit():
-                for _ in range(int(token)):
-                    if next(tokens, None) is None:
-                        break
+            else:
+                deque(islice(tokens, written_length(token)), maxlen=0)
         return " ".join(kept)
 
     def single_dtype(self) -> np.dtype[Any]:
@@ -96,8 +121,49 @@ class Element:
         return np.dtype(parts)
 
 
-def skip_element(file: BinaryIO, element: Element, source: str, progress: Progress) -> None:
-    """Pass over an element's data.
+def written_length(token: str) -> int:
+    """Give the length of a list in ASCII data, which some programs write as 3.0; 0 if it is none."""
+    if token.isdecimal() and len(token) < _LONGEST_NUMBER:
+        return int(token)
+    try:
+        length = float(token)
+    except ValueError:
+        return 0
+    return int(length) if length.is_integer() and 0 <= length <= sys.maxsize else 0
+
+
+@dataclass
+class Lists:
+    """The lists of one property, all one after the other.
+
+    Attributes
+    ----------
+    place
+        Which of the element's properties it is.
+    lengths, values
+        In parts, in the order of the rows.
+    """
+
+    place: int
+    lengths: list[NDArray[np.int64]] = field(default_factory=list)
+    values: list[NDArray[np.int64]] = field(default_factory=list)
+
+    def take(self, lengths: NDArray[Any], values: NDArray[Any]) -> None:
+        """Add the lists of some rows; numbers that are no whole ones become negative."""
+        with np.errstate(invalid="ignore"):
+            self.lengths.append(lengths.astype(np.int64))
+            self.values.append(values.astype(np.int64))
+
+    def joined(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Give all lengths and all values."""
+        none = np.empty(0, np.int64)
+        return np.concatenate([none, *self.lengths]), np.concatenate([none, *self.values])
+
+
+def skip_element(
+    file: BinaryIO, element: Element, source: str, progress: Progress, *, lists: Lists | None = None
+) -> None:
+    """Pass over an element's data, but for one property's lists.
 
     Raises
     ------
@@ -106,17 +172,20 @@ def skip_element(file: BinaryIO, element: Element, source: str, progress: Progre
     """
     # The names of an element that nobody reads may be anything, the same twice included.
     numbered = [Property(f"{i}", item.dtype, item.length) for i, item in enumerate(element.properties)]
-    for _ in element_blocks(file, Element(element.name, element.count, numbered), source, progress):
+    for _ in element_blocks(
+        file, Element(element.name, element.count, numbered), source, progress, lists=lists
+    ):
         pass
 
 
 def element_blocks(
-    file: BinaryIO, element: Element, source: str, progress: Progress
+    file: BinaryIO, element: Element, source: str, progress: Progress, *, lists: Lists | None = None
 ) -> Iterator[NDArray[Any]]:
     """Read an element block by block, as structured arrays with its single numbers among their fields.
 
     Rows whose lists all have the lengths of the first row's (a mesh of triangles) are read as they lie in the
     file; from the first block with others on, each row is visited. A block is valid until the next one.
+    `lists` takes those of its property.
 
     Raises
     ------
@@ -137,24 +206,28 @@ def element_blocks(
             raise _cut_off(source, element)
         if not whole or not _have_lengths(block, lengths):
             file.seek(place)
-            yield from _visited(file, element, element.count - start, source, progress)
+            yield from _visited(file, element, element.count - start, source, progress, lists)
             return
         progress.advance(block.nbytes)
+        if lists is not None:
+            values = block[f"list {lists.place}"]
+            lists.take(np.full(len(block), values.shape[1]), values.ravel())
         yield block
 
 
 def _first_lengths(file: BinaryIO, element: Element, source: str) -> list[int]:
     """Give the lengths of the first row's lists, and leave the file where it is."""
     place = file.tell()
+    size = os.fstat(file.fileno()).st_size
     lengths = []
     for item in element.properties:
-        size = np.dtype(item.dtype).itemsize
+        width = np.dtype(item.dtype).itemsize
         if item.length:
             length = np.frombuffer(file.read(np.dtype(item.length).itemsize), np.uint8)
-            lengths.append(_length(length, 0, item, element, source))
-            size *= lengths[-1]
-        file.seek(size, os.SEEK_CUR)
-    if file.tell() > os.fstat(file.fileno()).st_size:
+            lengths.append(_length(length, 0, item, element, source, size))
+            width *= lengths[-1]
+        file.seek(width, os.SEEK_CUR)
+    if file.tell() > size:
         raise _cut_off(source, element)
     file.seek(place)
     return lengths
@@ -166,7 +239,7 @@ def _have_lengths(block: NDArray[Any], lengths: list[int]) -> bool:
 
 
 def _visited(
-    file: BinaryIO, element: Element, count: int, source: str, progress: Progress
+    file: BinaryIO, element: Element, count: int, source: str, progress: Progress, lists: Lists | None
 ) -> Iterator[NDArray[Any]]:
     """Visit the last `count` rows of an element one by one, and leave the file at their end."""
     place = file.tell()
@@ -177,12 +250,25 @@ def _visited(
         block = np.empty(len(starts), element.single_dtype())
         for i, item in enumerate(element.properties):
             if not item.length:
-                kind = np.dtype(item.dtype)
-                block[item.name] = buffer[starts[:, i, None] + np.arange(kind.itemsize)].view(kind)[:, 0]
+                block[item.name] = _gathered(buffer, starts[:, i], item.dtype)
+        if lists is not None:
+            item, begins = element.properties[lists.place], starts[:, lists.place]
+            lengths = _gathered(buffer, begins, item.length).astype(np.int64)
+            # Of each value: its place in its list, from which that in the file follows.
+            along = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+            first = np.repeat(begins + np.dtype(item.length).itemsize, lengths)
+            lists.take(lengths, _gathered(buffer, first + along * np.dtype(item.dtype).itemsize, item.dtype))
         progress.advance(end - offset)
         offset = end
         yield block
     file.seek(place + offset)
+
+
+def _gathered(buffer: NDArray[np.uint8], starts: NDArray[np.int64], dtype: str) -> NDArray[Any]:
+    """Take the numbers that begin at these bytes."""
+    kind = np.dtype(dtype)
+    numbers: NDArray[Any] = buffer[starts[:, None] + np.arange(kind.itemsize)].view(kind)[:, 0]
+    return numbers
 
 
 def _walk(
@@ -194,7 +280,7 @@ def _walk(
         for i, item in enumerate(element.properties):
             starts[row, i] = offset
             if item.length:
-                length = _length(buffer, offset, item, element, source)
+                length = _length(buffer, offset, item, element, source, buffer.size)
                 offset += np.dtype(item.length).itemsize + length * np.dtype(item.dtype).itemsize
             else:
                 offset += np.dtype(item.dtype).itemsize
@@ -203,17 +289,24 @@ def _walk(
     return starts, offset
 
 
-def _length(buffer: NDArray[np.uint8], offset: int, item: Property, element: Element, source: str) -> int:
+def _length(
+    buffer: NDArray[np.uint8], offset: int, item: Property, element: Element, source: str, most: int
+) -> int:
+    """Read a list's length, of at most what a file of `most` bytes holds."""
     kind = np.dtype(item.length)
     if offset + kind.itemsize > buffer.size:
         raise _cut_off(source, element)
-    length = int(buffer[offset : offset + kind.itemsize].view(kind)[0])
-    if length < 0:
-        raise FileFormatError(f"{source}: a list '{item.name}' has the length {length}")
-    return length
+    length = buffer[offset : offset + kind.itemsize].view(kind)[0]
+    # Some programs declare lengths as float or double.
+    if not (length >= 0 and length == np.floor(length)):
+        raise FileFormatError(f"{source}: a list '{item.name[:40]}' has the length {length}")
+    if length > most:
+        raise _cut_off(source, element)
+    return int(length)
 
 
 def _cut_off(source: str, element: Element) -> FileFormatError:
     return FileFormatError(
-        f"{source}: cut off: its header promises {element.count} of '{element.name}', the file ends before"
+        f"{source}: cut off: its header promises {element.count} of '{element.name[:40]}', the file ends "
+        "before"
     )

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-import re
 import warnings
-from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,11 +12,10 @@ from typing import Any
 import numpy as np
 
 from surfsig.errors import FileFormatError, InvalidInputError
+from surfsig.files.paths import Paths, files_of_folder, matches, natural
 from surfsig.files.ros_bag import BagTopic, bag_of
 from surfsig.files.timestamps import times_of_names
 from surfsig.point_cloud import PointCloud
-
-Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,9 +84,9 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
     ----------
     paths
         A file that `surfsig.read` reads, a folder of such files, or a ROS bag (a ROS 1 file, or a ROS 2
-        folder or file of it), or several of them. Files of a folder are taken in the natural order of their
-        names (2 before 10), and so are several paths; hidden files are left out, and those of another suffix
-        than most have.
+        folder or file of it), a pattern that matches such (``"scan/*.ply"``), or several of them. Files of a
+        folder are taken in the natural order of their names (2 before 10), and so are several paths; hidden
+        files are left out, and those of another suffix than most have.
     topic
         Of bags: which topic's clouds (sensor_msgs/PointCloud2), where there are several.
     reading
@@ -106,7 +103,7 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
     Raises
     ------
     OSError
-        If a path is missing.
+        If a path is missing, or nothing matches a pattern.
     FileFormatError
         If a bag cannot be opened, or a folder holds no files.
     InvalidInputError
@@ -119,7 +116,7 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
     """
     given = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
     parts: list[Path | BagTopic] = []
-    chosen = sorted((Path(path) for path in given), key=_natural)
+    chosen = sorted((file for path in given for file in matches(Path(path)) or [Path(path)]), key=natural)
     for path in chosen:
         # Whatever is missing says so now, and not after hours.
         path.stat()
@@ -127,7 +124,7 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
         if bag is not None:
             parts.append(BagTopic(bag, topic))
         elif path.is_dir():
-            parts += _files_of(path)
+            parts += files_of_folder(path)
         else:
             parts.append(path)
     if not parts:
@@ -150,23 +147,3 @@ def scan_or_empty(path: Path, **reading: Any) -> PointCloud:
         told = str(error) if isinstance(error, FileFormatError) else f"{path}: {error.strerror or error}"
         warnings.warn(f"{told}; taken as a scan without points", stacklevel=2)
         return PointCloud(np.zeros((0, 3), np.float32))
-
-
-def _files_of(folder: Path) -> list[Path]:
-    """Give the scans of a folder: the files of the commonest kind, as poses and times may lie beside them."""
-    inside = [file for file in folder.iterdir() if file.is_file() and file.name[0] != "."]
-    if not inside:
-        raise FileFormatError(f"{folder}: holds no files")
-    kinds = Counter(file.suffix.lower() for file in inside)
-    kind = max(sorted(kinds), key=lambda suffix: kinds[suffix])
-    others = len(inside) - kinds[kind]
-    if others:
-        name = f"'{kind}'" if kind else "without a suffix"
-        warnings.warn(f"{folder}: {others} files that are not {name} are left out", stacklevel=3)
-    return sorted((file for file in inside if file.suffix.lower() == kind), key=_natural)
-
-
-def _natural(path: Path) -> list[tuple[int, int, str]]:
-    """Compare runs of digits as numbers; the name itself decides between 1 and 01."""
-    words = re.split(r"(\d+)", str(path))
-    return [(0, int(word), word) if word.isdecimal() else (1, 0, word) for word in words]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
 from surfsig.files.columns import cloud_from_columns
+from surfsig.files.encodings import decoded
 from surfsig.files.lines import (
     Block,
     content,
@@ -29,6 +29,7 @@ from surfsig.point_cloud import PointCloud
 _HEAD_BYTES = 1 << 16
 # Maple writes a list of points as "Points:=[", then "[x, y, z], " per line, then "];".
 _MAPLE = re.compile(r"\w+\s*:=\s*\[\s*$")
+_DECIMAL = re.compile(r"[.eE]")
 _BRACKETS = str.maketrans("[],;", "    ")
 
 
@@ -46,12 +47,15 @@ class Layout:
         Lines before the first point.
     brackets
         The numbers stand in Maple's brackets.
+    decimals
+        The columns whose first number is written with a decimal point or an exponent.
     """
 
     names: list[str]
     delimiter: str | None
     skip: int
     brackets: bool
+    decimals: list[str]
 
 
 def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
@@ -67,7 +71,7 @@ def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
     FileFormatError
         Naming the first line that cannot be understood.
     """
-    file = _decoded(file)
+    file = decoded(file)
     start = file.tell()
     layout = _layout(file.read(_HEAD_BYTES), source)
     file.seek(start)
@@ -76,17 +80,9 @@ def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
         for block in _without_bad_end(line_blocks(file, 1, progress), layout, source)
     ]
     table = np.concatenate(blocks)
-    return cloud_from_columns({name: table[:, i] for i, name in enumerate(layout.names)}, source=source)
-
-
-def _decoded(file: BinaryIO) -> BinaryIO:
-    """Skip a byte order mark; turn UTF-16, which some Windows programs write, into bytes of one per digit."""
-    mark = file.read(3)
-    if mark.startswith((b"\xff\xfe", b"\xfe\xff")):
-        file.seek(0)
-        return io.BytesIO(file.read().decode("utf-16", errors="replace").encode())
-    file.seek(3 if mark == b"\xef\xbb\xbf" else 0)
-    return file
+    return cloud_from_columns(
+        {name: table[:, i] for i, name in enumerate(layout.names)}, source=source, decimals=layout.decimals
+    )
 
 
 def _layout(head: bytes, source: str) -> Layout:
@@ -105,10 +101,13 @@ def _layout(head: bytes, source: str) -> Layout:
             continue
         text = line.translate(_BRACKETS) if brackets else line
         delimiter = next((mark for mark in ";," if mark in text), None)
-        width = len(tokens_of(text, delimiter))
+        tokens = tokens_of(text, delimiter)
+        width = len(tokens)
         wrong = fault(text, width, delimiter, comments=True)
         if wrong is None and width >= 3:
-            return Layout(_names(header, comment, width), delimiter, number, brackets)
+            names = _names(header, comment, width)
+            decimals = [name for name, token in zip(names, tokens, strict=True) if _DECIMAL.search(token)]
+            return Layout(names, delimiter, number, brackets, decimals)
         cut_off = number == len(lines) - 1 and not head.endswith(b"\n")
         if header or brackets or wrong is None or cut_off:
             reason = wrong[0] if wrong else f"{width} values where a point needs three"

@@ -76,7 +76,7 @@ class Registration:
         InvalidInputError
             If they are no points.
         """
-        places = coordinate_array(np.asarray(points), "points").astype(np.float64)
+        places = coordinate_array(points, "points").astype(np.float64)
         rotation, shift = self.T_target_source[:3, :3], self.T_target_source[:3, 3]
         return np.asarray(places @ rotation.T + shift)
 
