@@ -7,7 +7,7 @@ a file called ``scan.pcd`` are therefore read as PLY. What is written has the fo
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files import formats
 from surfsig.files.atomic import check_target, replacing
 from surfsig.files.columns import Chunks, output_columns
-from surfsig.files.options import box_array, cropped, in_metres, metres_per
+from surfsig.files.options import box_array, column_names, cropped, in_metres, metres_per
 from surfsig.files.progress import Progress, ProgressCallback
 from surfsig.files.sequence import ScanSequence, TimedScan, scan_sequence
 from surfsig.files.trajectory import (
@@ -51,6 +51,7 @@ def read(
     *,
     box: ArrayLike | None = None,
     unit: str | None = None,
+    columns: str | Sequence[str] | None = None,
     scan: int | None = None,
     samples: int | None = None,
     intrinsics: ArrayLike | None = None,
@@ -59,8 +60,8 @@ def read(
 ) -> PointCloud:
     """Read a point cloud.
 
-    From PLY, PCD, LAS, LAZ, COPC, E57, text (XYZ, CSV, TXT, ASC), NPY, NPZ, Parquet, STL, OBJ, KITTI's .bin
-    or a depth image (PNG of 16 bits).
+    From PLY, PCD, LAS, LAZ, COPC, E57, text (XYZ, CSV, TXT, ASC, PTS), PTX, NPY, NPZ, Parquet, STL, OBJ, rows
+    of float32 (KITTI's and nuScenes' .bin) or a depth image (PNG of 16 bits).
 
     Parameters
     ----------
@@ -72,8 +73,13 @@ def read(
     unit
         What the file's numbers are: "mm", "cm", "m", "km", "in", "ft" or "us-ft". The cloud is then in
         metres; by default it stays as it is.
+    columns
+        Of text, rows of float32, and NPY (n, k): a name for each column of the file, such as
+        "x,y,z,intensity,ring" or ["_", "x", "y", "z"]; ``_`` leaves one out. By default the file's header
+        says, or what the numbers can be; a file of which that is not certain is refused.
     scan
-        Of an E57 file with several scans, the one with this number, from 0; by default all of them.
+        Of an E57, PTX or PTS file with several scans, the one with this number, from 0; by default all of
+        them.
     samples
         Of a mesh (OBJ, STL), this many points spread evenly over its surface, in place of its vertices.
     intrinsics
@@ -100,8 +106,9 @@ def read(
     Warns
     -----
     UserWarning
-        If the last line of a text file is cut off (it is dropped) or may be, or values are left out that are
-        no numbers.
+        If the last line of a text file is cut off (it is dropped) or may be; if values are left out that are
+        no numbers; if the names of the coordinates say degrees, or another unit than metres and `unit`; if
+        nobody named the columns and the first three may be no coordinates.
 
     Notes
     -----
@@ -113,7 +120,7 @@ def read(
     corners = None if box is None else box_array(box)
     metres = None if unit is None else metres_per(unit)
     options = {
-        "scan": scan, "samples": samples, "intrinsics": intrinsics, "depth_scale": depth_scale,
+        "columns": None if columns is None else column_names(columns), "scan": scan, "samples": samples, "intrinsics": intrinsics, "depth_scale": depth_scale,
     }  # fmt: skip
     given = {name: value for name, value in options.items() if value is not None}
     with path.open("rb") as file:
@@ -124,6 +131,8 @@ def read(
                 raise InvalidInputError(f"{path}: holds {kind.name} data, for which '{name}' means nothing")
         if corners is not None and "box" in kind.takes:
             given["box"] = corners
+        if unit is not None and "unit" in kind.takes:
+            given["unit"] = unit
         file.seek(0)
         try:
             cloud = reader(file, str(path), Progress(progress, size), **given)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
+from surfsig.files.coordinate_names import coordinates_of, warn_of_units
 from surfsig.point_cloud import PointCloud
 
 # Coordinates printed as text and declared float32 stay float64 where float32 would move a point by more than
@@ -56,10 +57,12 @@ def cloud_from_columns(
     grid: tuple[int, int] | None = None,
     declared_float32: bool = False,
     error: type[SurfsigError] = FileFormatError,
+    unit: str | None = None,
 ) -> PointCloud:
-    """Make a cloud of named columns: x, y, z in any case, or `points` (n, 3); the others are its fields.
+    """Make a cloud of named columns; those that are no coordinates are its fields.
 
-    Coordinates that lie in memory as (n, 3) are not copied.
+    Coordinates are x, y, z in any case, or `points` (n, 3), or what else `coordinate_names` knows (pos_x,
+    Easting, ...). Those that lie in memory as (n, 3) are not copied.
 
     Parameters
     ----------
@@ -73,7 +76,14 @@ def cloud_from_columns(
         The coordinates were parsed as float64 from text that declares float32: narrow them where that
         loses nothing that matters (see `LOSS_ALLOWED`).
     error
-        What is raised if a coordinate is missing or no number.
+        What is raised if a coordinate is missing, is no number, or may be several columns.
+    unit
+        What the caller says that the coordinates' unit is.
+
+    Warns
+    -----
+    UserWarning
+        If the coordinates' names give another unit than metres and `unit`.
     """
     by_lower_name = {name.lower(): name for name in reversed(list(columns))}
     points = columns.get(by_lower_name.get("points", ""))
@@ -86,12 +96,15 @@ def cloud_from_columns(
         rest = {name: values for name, values in columns.items() if name != by_lower_name["points"]}
         columns = {**dict(zip("xyz", points.T, strict=True)), **rest}
         by_lower_name |= {axis: axis for axis in "xyz"}
-    missing = [axis for axis in "xyz" if axis not in by_lower_name]
-    if missing:
+    single = [name for name, values in columns.items() if values.ndim == 1]
+    coordinates = coordinates_of(single, source, error)
+    if coordinates is None:
+        missing = next((axis for axis in "xyz" if axis not in by_lower_name), "x")
         raise error(
-            f"{source}: no column '{missing[0]}' among the point's values ({', '.join(columns) or 'none'})"
+            f"{source}: no column '{missing}' among the point's values ({', '.join(columns) or 'none'})"
         )
-    axes = [by_lower_name[axis] for axis in "xyz"]
+    warn_of_units(coordinates, source, unit)
+    axes = coordinates.names
     first = columns[axes[0]]
     for axis in axes:
         if columns[axis].dtype.kind not in "fiu":

@@ -16,15 +16,17 @@ from surfsig.files import (
     depth_image,
     e57,
     e57_writer,
-    kitti,
+    float32_rows,
     numpy_files,
     obj,
     parquet,
     pcd,
     pcd_write,
     ply,
+    ptx,
     stl,
     text,
+    text_write,
 )
 from surfsig.files.columns import Chunks
 from surfsig.files.progress import Progress
@@ -93,7 +95,8 @@ class Format:
     reserved
         Names that a column cannot have.
     takes
-        The options of `surfsig.read` that mean something to this format's reader.
+        The options of `surfsig.read` that mean something to this format's reader; any takes a box and a unit,
+        which are named here where it must know of them.
     """
 
     name: str
@@ -132,8 +135,21 @@ def _is_obj(look: Look) -> bool:
     return _is_text(look) and (look.extension == ".obj" or obj.MAGIC.match(look.head) is not None)
 
 
-def _is_kitti(look: Look) -> bool:
-    return look.extension == ".bin" and not _is_text(look) and kitti.is_plausible(look.head, look.size)
+def _is_float32_rows(look: Look) -> bool:
+    # Nothing but zeros is a file that was never filled.
+    return look.extension == ".bin" and not _is_text(look) and any(look.head)
+
+
+def _is_ptx(look: Look) -> bool:
+    return _is_text(look) and ptx.MAGIC.match(look.head) is not None
+
+
+def _is_pts(look: Look) -> bool:
+    return _is_text(look) and _COUNTED.match(look.head) is not None
+
+
+def _is_csv(look: Look) -> bool:
+    return _is_text(look) and look.extension == ".csv"
 
 
 def _function(of: Callable[..., Any] | str) -> Any:
@@ -147,6 +163,9 @@ def _function(of: Callable[..., Any] | str) -> Any:
 # Bit 7 of the point format's number says that the points are compressed.
 _LAZ = re.compile(rb"LASF.{100}[\x80-\xff]", re.DOTALL)
 
+# The number of points stands above them; CloudCompare names the columns first.
+_COUNTED = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s*//[^\r\n]*)*\s*\d+[ \t]*[\r\n]")
+
 _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
 
 # The order matters: text comes last, because every PCD header and every HTML page is text as well; before it
@@ -154,7 +173,7 @@ _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
 FORMATS = (
     Format("PLY", (".ply",), _matches(ply.MAGIC), ply.read, ply.write),
     Format("PCD", (".pcd",), _matches(pcd.MAGIC), pcd.read, pcd_write.write, reserved=pcd_write.RESERVED),
-    Format("NPY", (".npy",), _begins(numpy_files.NPY_MAGIC), numpy_files.read_npy),
+    Format("NPY", (".npy",), _begins(numpy_files.NPY_MAGIC), numpy_files.read_npy, takes=("columns",)),
     Format(
         "NPZ",
         (".npz",),
@@ -185,9 +204,14 @@ FORMATS = (
     # A binary file may begin with "solid" too.
     Format("STL", (".stl",), _is_binary_stl, stl.read_binary, takes=("samples",)),
     Format("ASCII STL", (".stl",), _matches(stl.ASCII_MAGIC), stl.read_ascii, takes=("samples",)),
-    Format("KITTI", (".bin",), _is_kitti, kitti.read),
+    Format("rows of float32", (".bin",), _is_float32_rows, float32_rows.read, takes=("columns",)),
     Format("OBJ", (".obj",), _is_obj, obj.read, takes=("samples",)),
-    Format("text", (".xyz", ".csv", ".txt", ".asc"), _is_text, text.read),
+    Format("PTX", (".ptx",), _is_ptx, ptx.read, takes=("scan",)),
+    Format("PTS", (".pts",), _is_pts, text.read, takes=("columns", "scan", "unit")),
+    Format("CSV", (".csv",), _is_csv, text.read, text_write.write_csv, takes=("columns", "unit")),
+    Format(
+        "text", (".xyz", ".txt", ".asc"), _is_text, text.read, text_write.write_plain, takes=("columns", "unit")
+    ),
 )
 
 
