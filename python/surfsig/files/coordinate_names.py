@@ -33,8 +33,8 @@ _BEHIND_SLASH = re.compile(r"\s*(?:/|\bin\b)\s*([a-z°][a-z° -]*)$")
 _BEHIND_BLANK = re.compile(r"[ _]([a-z]+)$")
 _SEPARATORS = re.compile(r"[\s_.:,\-]+")
 
-_EAST = frozenset({"easting", "eastings", "east", "e", "rechtswert", "ostwert"})
-_NORTH = frozenset({"northing", "northings", "north", "n", "hochwert", "nordwert"})
+_EAST = frozenset({"easting", "eastings", "east", "rechtswert", "ostwert"})
+_NORTH = frozenset({"northing", "northings", "north", "hochwert", "nordwert"})
 _HEIGHT = frozenset(
     {
         "elevation", "elev", "height", "altitude", "alt", "h", "up", "u", "level", "hoehe", "höhe",
@@ -55,7 +55,7 @@ _NUMBERS = {"0": 0, "1": 1, "2": 2}
 
 # Which kinds of names win over others: what is called x, y, z, whatever else is there; degrees only if nothing
 # else is.
-_EXACT, _NAMED_AXES, _PLACES, _ANGLES = range(4)
+_EXACT, _NAMED_AXES, _PLACES, _LETTERS, _ANGLES = range(5)
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,8 @@ def coordinates_of(
     """Find the coordinates among columns by their names, in any case.
 
     Names x, y and z win; then those with a unit behind (X [mm], x(m)) or with a height for z; then words of
-    place beside an axis (pos_x, x_coord, Points:0) or directions (Easting, N); then longitude and latitude.
+    place beside an axis (pos_x, x_coord, Points:0) or directions (Easting); then E, N; then longitude and
+    latitude.
 
     Returns
     -------
@@ -193,6 +194,7 @@ def _readings(name: str, plain: str) -> Iterable[tuple[int, str, int]]:
         yield _NAMED_AXES, "", _AXES[plain]
     for family, rank, sets in (
         ("directions", _PLACES, (_EAST, _NORTH, _HEIGHT | {"z"})),
+        ("letters", _LETTERS, ({"e"}, {"n"}, _HEIGHT | {"z"})),
         ("angles", _ANGLES, (_LONGITUDE, _LATITUDE, _HEIGHT | {"z"})),
         ("axes and height", _NAMED_AXES, ({"x"}, {"y"}, _HEIGHT)),
     ):

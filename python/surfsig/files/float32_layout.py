@@ -44,7 +44,8 @@ class _Limits(NamedTuple):
     whole: bool = False
 
 
-_COORDINATE = _Limits(float(np.nextafter(-FARTHEST, 0)), float(np.nextafter(FARTHEST, 0)))
+_MOST_COORDINATE = float(np.nextafter(np.float32(FARTHEST), np.float32(0)))
+_COORDINATE = _Limits(-_MOST_COORDINATE, _MOST_COORDINATE)
 _FINITE = _Limits(float(np.finfo(np.float32).min), float(np.finfo(np.float32).max))
 _LIMITS = {
     **dict.fromkeys(("x", "y", "z"), _COORDINATE),

@@ -204,7 +204,7 @@ FORMATS = (
     # A binary file may begin with "solid" too.
     Format("STL", (".stl",), _is_binary_stl, stl.read_binary, takes=("samples",)),
     Format("ASCII STL", (".stl",), _matches(stl.ASCII_MAGIC), stl.read_ascii, takes=("samples",)),
-    Format("rows of float32", (".bin",), _is_float32_rows, float32_rows.read, takes=("columns",)),
+    Format("float32 rows", (".bin",), _is_float32_rows, float32_rows.read, takes=("columns",)),
     Format("OBJ", (".obj",), _is_obj, obj.read, takes=("samples",)),
     Format("PTX", (".ptx",), _is_ptx, ptx.read, takes=("scan",)),
     Format("PTS", (".pts",), _is_pts, text.read, takes=("columns", "scan", "unit")),

@@ -300,10 +300,15 @@ def _header(above: list[str], delimiter: str | None, rows: list[list[str]], sour
 
 def _names_in(text: str, delimiter: str | None, comment: bool) -> Iterator[list[str]]:
     """Cut a line into names, by the rows' delimiter first; a comment may use another, and begin with a word."""
-    yield [cell.strip("\"'") for cell in cells_of(text, delimiter)]
+    marks = [delimiter]
     if comment:
-        for mark in (",", ";", "\t", None):
-            yield [cell.strip("\"'") for cell in cells_of(text, mark)]
+        marks += [",", ";", "\t", None]
+    elif delimiter is None:
+        # Names of several words.
+        marks.append("\t")
+    for mark in marks:
+        yield [cell.strip("\"'") for cell in cells_of(text, mark)]
+    if comment:
         for mark in ":=":
             if mark in text:
                 yield text.partition(mark)[2].replace(",", " ").split()
