@@ -82,7 +82,7 @@ def read(file: BinaryIO, source: str, progress: Progress, scan: int | None = Non
 
 
 def _scans(file: BinaryIO, source: str, progress: Progress) -> Iterator[_Scan]:
-    header: list[str] = []
+    header: list[NDArray[np.float64]] = []
     current: _Scan | None = None
     for block in line_blocks(file, 1, progress):
         filled = [i for i, line in enumerate(block.lines) if line.strip()]
@@ -90,7 +90,8 @@ def _scans(file: BinaryIO, source: str, progress: Progress) -> Iterator[_Scan]:
         while done < len(filled):
             number = block.first + filled[done]
             if current is None:
-                header.append(block.lines[filled[done]])
+                line, width = block.lines[filled[done]], _HEADER_WIDTHS[len(header)]
+                header.append(parse([line], np.float64, width, source=source, first=number)[0])
                 done += 1
                 if len(header) == len(_HEADER_WIDTHS):
                     current = _begun(header, source, number)
@@ -108,12 +109,8 @@ def _scans(file: BinaryIO, source: str, progress: Progress) -> Iterator[_Scan]:
         raise FileFormatError(f"{source}: cut off: its last scan has fewer lines than its header promises")
 
 
-def _begun(header: list[str], source: str, number: int) -> _Scan:
+def _begun(rows: list[NDArray[np.float64]], source: str, number: int) -> _Scan:
     """Understand the lines above a scan's points, of which the last has this number."""
-    rows = []
-    for place, (line, width) in enumerate(zip(header, _HEADER_WIDTHS, strict=True)):
-        first = number - len(header) + 1 + place
-        rows.append(parse([line], np.float64, width, source=source, first=first)[0])
     columns, height = float(rows[0][0]), float(rows[1][0])
     if not (0 <= columns < _MOST_ROWS and 0 <= height < _MOST_ROWS and columns % 1 == height % 1 == 0):
         raise FileFormatError(f"{source}: line {number - 9}: a scan of {columns:g} x {height:g} points is none")

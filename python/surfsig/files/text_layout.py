@@ -19,6 +19,7 @@ from surfsig.files.options import LEFT_OUT, check_width
 from surfsig.files.number_words import (
     has_decimal_comma,
     has_decimal_point,
+    has_thousands,
     is_missing,
     is_number,
     may_be_thousands,
@@ -389,5 +390,8 @@ def _why_not_points(lines: Sequence[str], start: int) -> str:
         if wrong is None or header:
             reason = wrong[0] if wrong else f"{width} values where a point needs three"
             return f"{told}: line {number}: {reason}"
+        thousands = next((cell for cell in tokens_of(line, None) if has_thousands(cell)), None)
+        if thousands is not None:
+            return f"{told}: line {number}: {why_no_number(thousands)}"
         header = f"{told}: line {number}: {' '.join(line.split())[:40]!r} and no numbers"
     return header or "holds no points"
