@@ -1,4 +1,4 @@
-"""Rows of float32 without a header: KITTI's, nuScenes' and others, told apart by their numbers, or refused."""
+"""Rows of float32 without a header: KITTI's, nuScenes' and others, told apart by their numbers or refused."""
 
 import warnings
 from pathlib import Path
@@ -14,13 +14,16 @@ RINGS = 32
 
 
 def room(count: int, seed: int = 5) -> NDArray[np.float64]:
-    """Points on the walls of a room of 20 x 15 x 3 m, as a scanner in its middle sees them, laser by laser."""
+    """Points on the walls of a room of 20 x 15 x 3 m, as a scanner in its middle sees them."""
     ring = np.arange(count) % RINGS
     turn = (np.arange(count) // RINGS) / -(-count // RINGS) * 2 * np.pi
     up = np.deg2rad(ring * 40 / RINGS - 25)
     ray = np.column_stack([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
     reach = np.min(np.array([10, 7.5, 1.5]) / np.maximum(np.abs(ray), 1e-9), axis=1)
-    return ray * reach[:, None] + np.random.default_rng(seed).normal(0, 0.01, (count, 3))
+    points: NDArray[np.float64] = ray * reach[:, None] + np.random.default_rng(seed).normal(
+        0, 0.01, (count, 3)
+    )
+    return points
 
 
 def columns(count: int) -> dict[str, NDArray[np.float64]]:
@@ -75,7 +78,11 @@ def test_rows_are_told_apart(tmp_path: Path, kind: tuple[str, ...], count: int, 
 def test_the_order_of_points_does_not_matter(tmp_path: Path, order: str) -> None:
     count = 4200
     points = room(count)
-    places = np.random.default_rng(1).permutation(count) if order == "by chance" else np.lexsort([np.arange(count) % RINGS])
+    places = (
+        np.random.default_rng(1).permutation(count)
+        if order == "by chance"
+        else np.lexsort([np.arange(count) % RINGS])
+    )
     rows = np.hstack([points, columns(count)["intensity"], columns(count)["ring"]])[places].astype("<f4")
     for width in (3, 4, 5):
         (tmp_path / "a.bin").write_bytes(np.ascontiguousarray(rows[:, :width]).tobytes())
@@ -97,7 +104,9 @@ def test_several_layouts_are_named(tmp_path: Path) -> None:
     # Values by chance between 0 and 1 may be anything.
     rows = np.random.default_rng(2).uniform(0, 1, (4200, 3)).astype("<f4")
     (tmp_path / "a.bin").write_bytes(rows.tobytes())
-    with pytest.raises(FileFormatError, match=r"4200 of x y z, or 3150 of x y z intensity.*columns=") as error:
+    with pytest.raises(
+        FileFormatError, match=r"4200 of x y z, or 3150 of x y z intensity.*columns="
+    ) as error:
         read(tmp_path / "a.bin")
     assert "\n" not in str(error.value)
     np.testing.assert_array_equal(read(tmp_path / "a.bin", columns="x,y,z").points, rows)

@@ -114,8 +114,14 @@ def test_ptx_is_moved_and_keeps_its_grid(tmp_path: Path) -> None:
 
 
 def test_ptx_turns_points(tmp_path: Path) -> None:
-    cloud = quietly(save(tmp_path, "a.ptx", ptx("1\n2\n", TURNED, ["1 0 0 0.1", "0 1 0.5 0.2"], "0 0 0\n1 0 0\n0 1 0\n0 0 1\n")))
-    np.testing.assert_allclose(cloud.points, [[10, 21, 30], [9, 20, 30.5]])
+    cloud = quietly(
+        save(
+            tmp_path,
+            "a.ptx",
+            ptx("1\n2\n", TURNED, ["1 0 0 0.1", "0 1 0.5 0.2"], "0 0 0\n1 0 0\n0 1 0\n0 0 1\n"),
+        )
+    )
+    np.testing.assert_allclose(cloud.points, np.array([[10, 21, 30], [9, 20, 30.5]]))
     assert cloud.viewpoint is not None
     assert cloud.viewpoint.tolist() == [10, 20, 30]
     assert cloud.grid is None
@@ -134,7 +140,7 @@ def test_several_scans_of_ptx(tmp_path: Path) -> None:
     assert cloud.viewpoint is None
     assert cloud.grid is None
     single = quietly(path, scan=1)
-    np.testing.assert_allclose(single.points, [[10, 21, 30], [9, 20, 30.5]])
+    np.testing.assert_allclose(single.points, np.array([[10, 21, 30], [9, 20, 30.5]]))
     assert single.viewpoint is not None
     assert quietly(path, scan=0).grid == (3, 2)
     with pytest.raises(InvalidInputError, match="there is no scan 2"):
@@ -146,9 +152,11 @@ def test_several_scans_of_ptx(tmp_path: Path) -> None:
 def test_a_ptx_longer_than_a_block(tmp_path: Path) -> None:
     points = np.random.default_rng(3).normal(size=(120_000, 3))
     rows = [f"{x!r} {y!r} {z!r} 0.25" for x, y, z in points.tolist()]
-    path = save(tmp_path, "a.ptx", ptx("300\n200\n", MOVED, rows[:60_000]) + ptx("200\n300\n", MOVED, rows[60_000:]))
+    path = save(
+        tmp_path, "a.ptx", ptx("300\n200\n", MOVED, rows[:60_000]) + ptx("200\n300\n", MOVED, rows[60_000:])
+    )
     cloud = quietly(path)
-    np.testing.assert_array_equal(cloud.points, points + [1, 2, 3])
+    np.testing.assert_array_equal(cloud.points, points + np.array([1, 2, 3]))
     assert cloud.viewpoint is not None
 
 
@@ -158,7 +166,10 @@ def test_a_ptx_longer_than_a_block(tmp_path: Path) -> None:
         (ptx("3\n3\n", MOVED, ROWS), "cut off"),
         (ptx("99999999\n99999999\n", MOVED, ROWS), "cut off"),
         (ptx("3\n2\n", MOVED, ROWS) + "1\n1\n0 0 0\n", "cut off"),
-        (ptx("3\n2\n", MOVED, ["1 2 3 4 5", *ROWS[1:]]), "line 11: 5 values where a point of PTX has 3, 4, 6, 7"),
+        (
+            ptx("3\n2\n", MOVED, ["1 2 3 4 5", *ROWS[1:]]),
+            "line 11: 5 values where a point of PTX has 3, 4, 6, 7",
+        ),
         (ptx("3\n2\n", MOVED, [*ROWS[:4], "1 2 x 4 5 6 7", ROWS[5]]), "line 15: 'x' is not a number"),
         (ptx("3\n2\n", MOVED, [*ROWS, "1 2 3 4 5 6 7"]), "7 values where 1 are expected"),
         (ptx("3\n2\n", "1 0 0 5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n", ROWS), "the matrix of the scan is no pose"),
@@ -187,9 +198,9 @@ def test_odd_files_with_counts(shared_data: Path, name: str, count: int, fields:
     cloud = quietly(shared_data / "odd_files" / "text_pts_ptx" / name)
     assert len(cloud) == count
     assert list(cloud.fields) == fields
-    begin = np.array([0, 1, 0])
+    begin = np.array([0.1, 1.2, 0.05])
     if name.endswith(".ptx"):
-        begin = begin + [1, 2, 3]
+        begin += np.array([1, 2, 3])
         assert cloud.viewpoint is not None
         assert cloud.viewpoint.tolist() == [1, 2, 3]
-    np.testing.assert_allclose(cloud.points[1], begin + [0.1, 0.2, 0.05])
+    np.testing.assert_allclose(cloud.points[1], begin)

@@ -24,7 +24,10 @@ def table(header: str, order: str, delimiter: str = ",") -> str:
     """Return the points under a header; `order` says what each column is: x y z, i (a number), n (counts)."""
     rows = []
     for number, point in enumerate(POINTS):
-        values = dict(zip("xyz", map(str, point), strict=True)) | {"i": str(20 + number), "n": str(number + 1)}
+        values = dict(zip("xyz", map(str, point), strict=True)) | {
+            "i": str(20 + number),
+            "n": str(number + 1),
+        }
         rows.append(delimiter.join(values[letter] for letter in order))
     return "\n".join([header, *rows]) + "\n"
 
@@ -76,7 +79,8 @@ def test_the_header_says_which_columns_are_the_coordinates(
 
 
 @pytest.mark.parametrize(
-    ("header", "unit"), [("X [mm],Y [mm],Z [mm]", "mm"), ("x(ft),y(ft),z(ft)", "ft"), ("X_cm,Y_cm,Z_cm", "cm")]
+    ("header", "unit"),
+    [("X [mm],Y [mm],Z [mm]", "mm"), ("x(ft),y(ft),z(ft)", "ft"), ("X_cm,Y_cm,Z_cm", "cm")],
 )
 def test_a_unit_in_the_header_is_named(tmp_path: Path, header: str, unit: str) -> None:
     path = save(tmp_path, "a.csv", table(header, "xyz"))
@@ -98,18 +102,31 @@ def test_degrees_are_no_lengths(tmp_path: Path) -> None:
     ("header", "order", "message"),
     [
         ("a,b,c,d", "ixyz", r"its header \(a, b, c, d\) names no coordinates; columns=\"x,y,z,_\""),
-        ("pos_x,pos_y,pos_z,map_x,map_y,map_z", "xyzxyz", r"several columns may be the coordinates \(pos_x, pos_y"),
+        (
+            "pos_x,pos_y,pos_z,map_x,map_y,map_z",
+            "xyzxyz",
+            r"several columns may be the coordinates \(pos_x, pos_y",
+        ),
         ("easting,northing,height,altitude", "xyzz", "several columns may be the coordinates"),
         ("nx,ny,nz,i", "xyzi", "names no coordinates"),
         ("X [mm],Y [m],Z [m]", "xyz", "several units"),
         (",0,1,2", "nxyz", "names no coordinates"),
+        (
+            "ncols 3\nnrows 3\nxllcorner 0\ncellsize 2",
+            "xyz",
+            "4 lines of words begin it .'ncols 3'., and none names",
+        ),
     ],
 )
-def test_a_header_without_coordinates_is_refused(tmp_path: Path, header: str, order: str, message: str) -> None:
+def test_a_header_without_coordinates_is_refused(
+    tmp_path: Path, header: str, order: str, message: str
+) -> None:
     path = save(tmp_path, "a.csv", table(header, order))
     with pytest.raises(FileFormatError, match=message):
         read(path)
-    names = ",".join(letter if order.index(letter) == i and letter in "xyz" else "_" for i, letter in enumerate(order))
+    names = ",".join(
+        letter if order.index(letter) == i and letter in "xyz" else "_" for i, letter in enumerate(order)
+    )
     assert quietly(path, columns=names).points.tolist() == POINTS
 
 
@@ -159,7 +176,9 @@ def test_other_formats_know_the_names_too(tmp_path: Path) -> None:
     cloud = quietly(tmp_path / "a.npy")
     assert cloud.points.tolist() == POINTS
     assert list(cloud.fields) == ["id"]
-    frame = pytest.importorskip("pandas").DataFrame({"pos_x": [1.0], "pos_y": [2.0], "pos_z": [3.0], "i": [4]})
+    frame = pytest.importorskip("pandas").DataFrame(
+        {"pos_x": [1.0], "pos_y": [2.0], "pos_z": [3.0], "i": [4]}
+    )
     assert PointCloud.of(frame).points.tolist() == [[1, 2, 3]]
     with pytest.raises(InvalidInputError, match="the DataFrame: several columns may be the coordinates"):
         PointCloud.of(frame.assign(map_x=1.0, map_y=2.0, map_z=3.0))
@@ -172,7 +191,10 @@ def test_other_formats_know_the_names_too(tmp_path: Path) -> None:
         ("".join(f"{i + 1},{i}.5,2.5,{i}.25\n" for i in range(3)), "the first column counts the rows"),
         ("".join(f"{1.7e9 + i / 10:.3f} {i}.5 2.5 {i}.25\n" for i in range(20)), "looks like a time"),
         ("".join(f"{1700000000000000000 + i * 10} {i}.5 2.5 7\n" for i in range(20)), "looks like a time"),
-        ("".join(f"P{i} {i}.5 2.5 {i}.25 7\n" for i in range(20)), "the first three columns are not all numbers"),
+        (
+            "".join(f"P{i} {i}.5 2.5 {i}.25 7\n" for i in range(20)),
+            "the first three columns are not all numbers",
+        ),
     ],
 )
 def test_first_columns_that_are_no_coordinates(tmp_path: Path, content: str, message: str) -> None:
@@ -213,7 +235,9 @@ def test_words_are_left_out_with_one_warning(tmp_path: Path) -> None:
         'T2,"4.125",5.0,-6.5,2024-05-01T12:00:01,false,\n'
         "T3,7.0,8.5,9.25,2024-05-01T12:00:02,true,NULL\n"
     )
-    with pytest.warns(UserWarning, match="left out what holds words and no numbers: 'name', 'time', 'valid'") as told:
+    with pytest.warns(
+        UserWarning, match="left out what holds words and no numbers: 'name', 'time', 'valid'"
+    ) as told:
         cloud = read(save(tmp_path, "a.csv", content))
     assert len(told) == 1
     assert cloud.points.tolist() == POINTS
@@ -231,11 +255,11 @@ def test_words_are_left_out_with_one_warning(tmp_path: Path) -> None:
         '"","x","y","z"\n"1",1.5,-2.25,3\n"2",4.125,5,-6.5\n"3",7,8.5,9.25\n',
         '"x" "y" "z" "row"\n1.5 -2.25 3 4\n4.125 5 -6.5 4\n7 8.5 9.25 4\n',
         '"x" "y" "z"\n"1" 1.5 -2.25 3\n"2" 4.125 5 -6.5\n"3" 7 8.5 9.25\n',
-        "Station A\nRun 7\n1.5 -2.25 3\n4.125 5 -6.5\n7 8.5 9.25\n",
+        "Station A\n1.5 -2.25 3\n4.125 5 -6.5\n7 8.5 9.25\n",
         "P1 1.5 -2.25 3\nP2 4.125 5 -6.5\nP3 7 8.5 9.25\n",
         "# columns: z y x\n3 -2.25 1.5\n-6.5 5 4.125\n9.25 8.5 7\n",
     ],
-    ids=["excel", "empty last", "R csv", "quoted", "R table", "titles", "names first", "comment"],
+    ids=["excel", "empty last", "R csv", "quoted", "R table", "title", "names first", "comment"],
 )
 def test_what_programs_write_around_the_numbers(tmp_path: Path, content: str) -> None:
     for encoded in (content.encode(), content.encode("utf-16")):
@@ -258,7 +282,10 @@ def test_words_in_a_column_of_numbers_are_damage(tmp_path: Path) -> None:
 def test_a_row_with_another_width_is_found_beside_columns_of_words(tmp_path: Path) -> None:
     rows = [f"a,{i},{i + 1},{i * i}.5" for i in range(9)]
     rows[5] = "a,5,6,25.5,8"
-    with pytest.raises(FileFormatError, match="line 7: 5 values where 4 are expected"), pytest.warns(UserWarning):
+    with (
+        pytest.raises(FileFormatError, match="line 7: 5 values where 4 are expected"),
+        pytest.warns(UserWarning, match="'name'"),
+    ):
         read(save(tmp_path, "a.csv", "name,x,y,z\n" + "\n".join(rows) + "\n"))
 
 
@@ -291,7 +318,9 @@ def test_odd_headers(shared_data: Path, name: str, low: list[float], high: list[
         ("txt_title_then_header.csv", None, {}),
     ],
 )
-def test_odd_columns(shared_data: Path, name: str, left_out: str | None, fields: dict[str, list[float]]) -> None:
+def test_odd_columns(
+    shared_data: Path, name: str, left_out: str | None, fields: dict[str, list[float]]
+) -> None:
     path = shared_data / "odd_files" / "text_columns_no_numbers" / name
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")

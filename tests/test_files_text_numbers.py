@@ -11,8 +11,9 @@ from surfsig.files import read
 from surfsig.point_cloud import PointCloud
 
 NANS = [
-    "nan", "NaN", "NAN", "-nan", "+nan", "nan(ind)", "-nan(ind)", "nan(snan)", "nan(0x8000000000000)", "NaNQ", "qNaN",
-    "1.#QNAN", "-1.#QNAN", "1.#QNAN0", "1.#SNAN", "1.#IND", "-1.#IND", "-1.#IND00", "1.#QNB", "-1.#IO", "1.#J", "1.$",
+    "nan", "NaN", "NAN", "-nan", "+nan", "nan(ind)", "-nan(ind)", "nan(snan)", "nan(0x8000000000000)", "NaNQ",
+    "qNaN", "1.#QNAN", "-1.#QNAN", "1.#QNAN0", "1.#SNAN", "1.#IND", "-1.#IND", "-1.#IND00", "1.#QNB",
+    "-1.#IO", "1.#J", "1.$",
     "NULL", "null", "None", "N/A", "#N/A", "NA", "<NA>", r"\N",
 ]  # fmt: skip
 INFINITIES = {"inf": 1, "-inf": -1, "+Inf": 1, "Infinity": 1, "-INFINITY": -1, "1.#INF": 1, "-1.#INF00": -1}
@@ -40,9 +41,11 @@ def test_nan_and_infinity_in_every_spelling(tmp_path: Path, mark: str) -> None:
     np.testing.assert_array_equal(cloud.fields["w"], np.arange(len(rows)))
 
 
-@pytest.mark.parametrize("word", ["nano", "1.#5", "nu", "NaN7", "inf2", "1.$5", "--", "-", "1_000", "0x10", "1,000,000"])
+@pytest.mark.parametrize(
+    "word", ["nano", "1.#5", "nu", "NaN7", "inf2", "1.$5", "--", "-", "1_000", "0x10", "1,000,000"]
+)
 def test_other_words_are_no_numbers(tmp_path: Path, word: str) -> None:
-    with pytest.raises(FileFormatError, match="line 4: .* is not a number"):
+    with pytest.raises(FileFormatError, match=r"line 4: .* is not a number"):
         read(save(tmp_path, "a.xyz", f"0 0 0\n1 2 3\n4 5 6\n7 {word} 9\n1 1 1\n2 2 2\n"))
 
 
@@ -113,7 +116,10 @@ def test_decimal_commas_beside_words_and_missing_values(tmp_path: Path) -> None:
     [
         ("1,2,3 4,5,6\n7,8,9 1,2,3\n", "both commas .* and blanks stand between numbers"),
         ("1,5 2.5 3,5\n1,5 2,5 3,5\n", "decimal comma .*'1,5'.* point .*'2.5'"),
-        ("100,000 200,000 300,000\n400,000 500,500 600,000\n", "'100,000' may be 100000, by thousands, or 100.000"),
+        (
+            "100,000 200,000 300,000\n400,000 500,500 600,000\n",
+            "'100,000' may be 100000, by thousands, or 100.000",
+        ),
         ("1,234,567 2,345,678 3,456,789\n", "both commas|is not a number"),
         ("1,234.5 2,345.6 3,456.7\n", "without commas between thousands"),
         ("x;y;z\n1,234.5;2,345.6;3,456.7\n", "without commas between thousands"),

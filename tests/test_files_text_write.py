@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from surfsig.files import Chunks, read, write
+from surfsig.files import Chunks, format_name, read, write
 from surfsig.point_cloud import PointCloud
 
 RNG = np.random.default_rng(4)
@@ -35,7 +35,8 @@ def example(count: int = 50) -> tuple[PointCloud, dict[str, NDArray[Any]]]:
 
 
 NAMES = [
-    "intensity", "red", "green", "blue", "time_of_flight", "k1", "direction_0", "direction_1", "count", "good",
+    "intensity", "red", "green", "blue", "time_of_flight", "k1", "direction_0", "direction_1", "count",
+    "good",
 ]  # fmt: skip
 
 
@@ -45,9 +46,17 @@ def test_numbers_come_back_with_the_same_bits(tmp_path: Path, extension: str) ->
     path = tmp_path / f"a.{extension}"
     write(path, cloud, columns, notes={"radius": "0.02"})
     again = read(path)
+    # Not "PTS", which the number at the end of a comment could be taken for.
+    assert format_name(path) == "text"
     np.testing.assert_array_equal(again.points.astype(np.float32), cloud.points)
     assert list(again.fields) == NAMES
-    written = [*cloud.fields.values(), columns["k1"], *columns["direction"].T, columns["count"], columns["good"]]
+    written = [
+        *cloud.fields.values(),
+        columns["k1"],
+        *columns["direction"].T,
+        columns["count"],
+        columns["good"],
+    ]
     for values, found in zip(written, again.fields.values(), strict=True):
         np.testing.assert_array_equal(found.astype(values.dtype), values)
     assert again.fields["red"].dtype == np.uint8
@@ -68,7 +77,7 @@ def test_csv_as_other_programs_read_it(tmp_path: Path) -> None:
 
 
 def test_text_as_other_programs_read_it(tmp_path: Path) -> None:
-    # Open3D reads the first three numbers of each line that begins with such; CloudCompare's own header is //.
+    # Open3D reads the first three numbers of each line that begins with them; CloudCompare's header is //.
     cloud, columns = example()
     write(tmp_path / "a.xyz", cloud, columns, notes={"radius": "0.02\nand more"})
     lines = (tmp_path / "a.xyz").read_text().splitlines()
@@ -103,7 +112,13 @@ def test_blocks_and_progress(tmp_path: Path) -> None:
     values = RNG.normal(size=(count, 2)).astype(np.float32)
     told: list[tuple[int, int]] = []
     chunks = Chunks("w", 2, np.float32, (values[start : start + 17_000] for start in range(0, count, 17_000)))
-    write(tmp_path / "a.csv", cloud, {"n": np.arange(count)}, chunks=chunks, progress=lambda *at: told.append(at))
+    write(
+        tmp_path / "a.csv",
+        cloud,
+        {"n": np.arange(count)},
+        chunks=chunks,
+        progress=lambda *at: told.append(at),
+    )
     again = read(tmp_path / "a.csv")
     np.testing.assert_array_equal(again.points, cloud.points)
     assert list(again.fields) == ["n", "w_0", "w_1"]

@@ -148,7 +148,7 @@ def json_option(command: Function) -> Function:
 
 def result_options(values: str, page: str) -> Callable[[Function], Function]:
     """Add -o, --json and --report; the words say what is written."""
-    formats = "A .ply, .pcd, .las, .laz, .e57, .npz or .parquet file."
+    formats = "A .ply, .pcd, .las, .laz, .e57, .npz, .parquet, .csv or .xyz file."
     options = [
         click.option("-o", "--output", type=CLOUD, help=formats),
         click.option(

@@ -120,8 +120,12 @@ def read(
     corners = None if box is None else box_array(box)
     metres = None if unit is None else metres_per(unit)
     options = {
-        "columns": None if columns is None else column_names(columns), "scan": scan, "samples": samples, "intrinsics": intrinsics, "depth_scale": depth_scale,
-    }  # fmt: skip
+        "columns": None if columns is None else column_names(columns),
+        "scan": scan,
+        "samples": samples,
+        "intrinsics": intrinsics,
+        "depth_scale": depth_scale,
+    }
     given = {name: value for name, value in options.items() if value is not None}
     with path.open("rb") as file:
         size = os.fstat(file.fileno()).st_size
@@ -200,18 +204,20 @@ def write(
     notes: Mapping[str, str] | None = None,
     progress: ProgressCallback | None = None,
 ) -> None:
-    """Write a cloud with further columns: PLY, PCD, LAS, LAZ, E57, NPZ or Parquet, by the extension.
+    """Write a cloud with further columns: PLY, PCD, LAS, LAZ, E57, NPZ, Parquet or text, by the extension.
 
     The file appears whole or not at all: a failure (a full disk) leaves an old file as it was.
 
     Parameters
     ----------
     path
-        The file; ``.ply``, ``.pcd``, ``.las``, ``.laz``, ``.e57``, ``.npz`` or ``.parquet``.
+        The file; ``.ply``, ``.pcd``, ``.las``, ``.laz``, ``.e57``, ``.npz``, ``.parquet``, ``.csv``, or
+        ``.xyz``, ``.txt`` and ``.asc`` with blanks between the numbers.
     cloud
         Its points come first (in PLY, PCD and E57 as double where float would change one of them; in LAS and
-        LAZ rounded to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields. In E57 its
-        viewpoint, or its viewpoints, become the poses of its scans. Or what else `PointCloud.of` takes.
+        LAZ rounded to steps of 1e-3 to 1e-9, the finest that fit their extent; in text with as few digits as
+        give back the same number in its type), then its fields. In E57 its viewpoint, or its viewpoints,
+        become the poses of its scans; CSV has no place for it. Or what else `PointCloud.of` takes.
     columns
         (n,) or (n, k) numbers by name. ``normals`` (n, 3) are written as nx, ny, nz and ``colors`` (n, 3 or
         4) as red, green, blue (and alpha); PCD packs colours of uint8 into ``rgb`` or ``rgba``. Any other
@@ -221,7 +227,7 @@ def write(
         One more column, (n, width), given block by block so that it need not fit in memory.
     notes
         Words about the whole file (PLY and PCD comments, a record of LAS; as JSON in Parquet's metadata, the
-        array ``notes`` of NPZ, the description of an E57 scan).
+        array ``notes`` of NPZ, the description of an E57 scan, comments ``// surfsig`` of text but CSV).
     progress
         Called with the points written so far and their number.
 

@@ -1,4 +1,4 @@
-"""Which columns are the coordinates, by their names: x y z, X [m], Points:0, pos_x, Easting Northing Elevation."""
+"""Which columns are the coordinates, by their names: x y z, X [m], Points:0, pos_x, Easting Northing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ _UNITS = {
     "m": "m", "meter": "m", "metre": "m", "meters": "m", "metres": "m",
     "km": "km", "kilometer": "km", "kilometre": "km", "kilometers": "km", "kilometres": "km",
     "in": "in", "inch": "in", "inches": "in",
-    "ft": "ft", "feet": "ft", "foot": "ft", "us-ft": "us-ft", "usft": "us-ft", "ftus": "us-ft", "us ft": "us-ft",
+    "ft": "ft", "feet": "ft", "foot": "ft",
+    "us-ft": "us-ft", "usft": "us-ft", "us ft": "us-ft", "ftus": "us-ft",
     "um": "µm", "µm": "µm", "μm": "µm", "micron": "µm", "microns": "µm", "nm": "nm",
 }  # fmt: skip
 _DEGREES = frozenset({"deg", "degree", "degrees", "°", "dd"})
@@ -46,15 +47,15 @@ _LATITUDE = frozenset({"latitude", "lat"})
 # Words beside an axis that say no more than that it is a coordinate.
 _PLACE_WORDS = frozenset(
     {
-        "pos", "position", "coord", "coords", "coordinate", "coordinates", "point", "points", "pt", "p", "loc",
-        "location", "place", "vertex", "cartesian", "xyz", "utm", "world", "global", "local", "map", "geometry",
+        "pos", "position", "coord", "coords", "coordinate", "coordinates", "point", "points", "pt", "p",
+        "loc", "location", "place", "vertex", "cartesian", "xyz", "utm", "world", "global", "local", "map",
+        "geometry",
     }
 )  # fmt: skip
 _AXES = {"x": 0, "y": 1, "z": 2}
 _NUMBERS = {"0": 0, "1": 1, "2": 2}
 
-# Which kinds of names win over others: what is called x, y, z, whatever else is there; degrees only if nothing
-# else is.
+# Which kinds of names win over others: x, y, z whatever else is there; degrees only if nothing else is.
 _EXACT, _NAMED_AXES, _PLACES, _LETTERS, _ANGLES = range(5)
 
 
@@ -115,8 +116,8 @@ def coordinates_of(
     if len(families) > 1 or (several and best != _EXACT):
         candidates = dict.fromkeys(name for axes in families for axis in axes for name in axis)
         raise error(
-            f"{source}: several columns may be the coordinates ({', '.join(candidates)}): three of them must be "
-            "called x, y and z (for text, by columns=)"
+            f"{source}: several columns may be the coordinates ({', '.join(candidates)}): three of them must "
+            "be called x, y and z (for text, by columns=)"
         )
     chosen = tuple(candidates[0] for candidates in families[0])
     lengths = chosen if best != _ANGLES else chosen[2:]
@@ -146,16 +147,16 @@ def warn_of_units(coordinates: Coordinates, source: str, asked: str | None = Non
     if coordinates.degrees:
         longitude, latitude, _ = coordinates.names
         warnings.warn(
-            f"{source}: x and y are '{longitude}' and '{latitude}' in degrees, which are no lengths: project them "
-            "to metres first",
+            f"{source}: x and y are '{longitude}' and '{latitude}' in degrees, which are no lengths: project "
+            "them to metres first",
             stacklevel=3,
         )
     elif coordinates.unit not in (None, asked) and (asked is not None or coordinates.unit != "m"):
         done = "are kept so" if asked is None else f"are taken as {asked}"
         hint = f': unit="{coordinates.unit}" gives metres' if coordinates.unit in UNITS else ""
         warnings.warn(
-            f"{source}: the coordinates are in {coordinates.unit} by their names ('{coordinates.names[0]}') and "
-            f"{done}{hint}",
+            f"{source}: the coordinates are in {coordinates.unit} by their names ('{coordinates.names[0]}') "
+            f"and {done}{hint}",
             stacklevel=3,
         )
 
@@ -164,7 +165,6 @@ def is_unit(word: str) -> bool:
     """Tell whether a word is no more than a unit of a column: m, [mm], (s), deg, -, or nothing."""
     plain = word.strip().strip("[](){}<>").strip().lower()
     return plain in _UNITS or plain in _DEGREES or plain in _OTHER_UNITS
-
 
 
 def _without_unit(name: str) -> tuple[str, str | None]:
@@ -214,4 +214,3 @@ def _readings(name: str, plain: str) -> Iterable[tuple[int, str, int]]:
                 yield _PLACES, word[1:], _AXES[word[0]]
             elif word[:-1] in _PLACE_WORDS and word[-1] in _AXES:
                 yield _PLACES, word[:-1], _AXES[word[-1]]
-

@@ -13,9 +13,11 @@ from surfsig.files.number_words import is_missing
 
 # Seconds since 1970 are more; no coordinate in metres is, on the Earth.
 _SMALLEST_TIME = 1e9
+# By how much a file's times differ at most, as a share: the seconds since 1970 by twenty days.
+_TIMES_SHARE = 0.001
 # Rows that are enough to say that values run on, or never change.
 _FEWEST_RUNNING, _FEWEST_CONSTANT = 3, 8
-# What a file with the number of its points above them holds, by the columns beside x, y, z (PTS).
+# The last three columns of a PTS file with six or seven.
 _COLOURS = ["red", "green", "blue"]
 
 
@@ -48,11 +50,13 @@ def first_columns(rows: list[list[str]], places: Sequence[int], hint: str, sourc
         If the first three may be something else.
     """
     if len(places) < 3:
-        raise FileFormatError(f"{source}: not a table of points: {len(places)} columns of numbers where a point needs three")
+        raise FileFormatError(
+            f"{source}: not a table of points: {len(places)} columns of numbers where a point needs three"
+        )
     if list(places[:3]) != [0, 1, 2] and len(places) != 3:
         raise FileFormatError(
-            f"{source}: not a table of points: the first three columns are not all numbers, and no header names "
-            f"the coordinates; {hint} does"
+            f"{source}: not a table of points: the first three columns are not all numbers, and no header "
+            f"names the coordinates; {hint} does"
         )
     if len(places) > 3:
         reason = _plainly_none(rows)
@@ -63,8 +67,8 @@ def first_columns(rows: list[list[str]], places: Sequence[int], hint: str, sourc
         doubt = _doubt(rows)
         if doubt is not None:
             warnings.warn(
-                f"{source}: no header names the coordinates, so the first three columns are x, y, z, although "
-                f"{doubt}; {hint} says otherwise",
+                f"{source}: no header names the coordinates, so the first three columns are x, y, z, "
+                f"although {doubt}; {hint} says otherwise",
                 stacklevel=5,
             )
     return list(places[:3])
@@ -78,7 +82,7 @@ def is_running(cells: Sequence[str]) -> bool:
 
 
 def names_of_counted(rows: list[list[str]]) -> list[str]:
-    """Name the columns of a file that begins with the number of its points: x y z, intensity, red green blue."""
+    """Name the columns of a file that begins with the number of its points: x y z, intensity, colours."""
     width = len(rows[0])
     more = [f"column_{i + 1}" for i in range(3, width)]
     coloured = width in (6, 7) and all(_is_byte(cell) for row in rows for cell in row[-3:])
@@ -98,11 +102,18 @@ def _plainly_none(rows: list[list[str]]) -> str | None:
     others = [[row[i] for row in rows] for i in (1, 2, 3)]
     if is_running(first) and all(not _are_whole(column) for column in others):
         return "counts the rows"
-    times = _values(first)
-    if len(times) > 1 and (times >= _SMALLEST_TIME).all() and (np.diff(times) >= 0).all():
-        if 0 < np.ptp(times) < 0.001 * times[0] and not any(_values(column).min() >= _SMALLEST_TIME for column in others):
-            return "looks like a time"
-    return None
+    return "looks like a time" if _is_time(_values(first)) and not any(map(_is_far, others)) else None
+
+
+def _is_time(values: NDArray[np.float64]) -> bool:
+    """Tell whether values run on from far, by little."""
+    if len(values) < 2 or values[0] < _SMALLEST_TIME:
+        return False
+    return bool((np.diff(values) >= 0).all() and 0 < np.ptp(values) < _TIMES_SHARE * values[0])
+
+
+def _is_far(cells: Sequence[str]) -> bool:
+    return bool((_values(cells) >= _SMALLEST_TIME).any())
 
 
 def _doubt(rows: list[list[str]]) -> str | None:
@@ -115,7 +126,9 @@ def _doubt(rows: list[list[str]]) -> str | None:
     if len(columns) >= 6 and all(map(_are_whole, columns[:3])):
         # Normals beside coordinates in whole millimetres are fractions too.
         further = [_values(column) for column in columns[3:6]]
-        if not any(map(_are_whole, columns[3:6])) and any(np.abs(values).max(initial=0) > 1 for values in further):
+        if not any(map(_are_whole, columns[3:6])) and any(
+            np.abs(values).max(initial=0) > 1 for values in further
+        ):
             return "they hold whole numbers and the next three do not"
     return None
 

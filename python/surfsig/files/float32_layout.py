@@ -91,7 +91,7 @@ class RowLayout:
         lengths = _squared_lengths(columns[3:6])
         unit = np.abs(lengths - 1) < _LENGTH_TOLERANCE
         # A point without a normal has 0 0 0; where most have none, they are something else.
-        return bool((unit | (lengths == 0)).all()) and 2 * np.count_nonzero(unit) >= len(lengths)
+        return bool((unit | (lengths == 0)).all()) and 2 * int(np.count_nonzero(unit)) >= len(lengths)
 
 
 def _within(values: NDArray[np.float32], limits: _Limits) -> bool:
@@ -156,7 +156,7 @@ def fitting_layouts(parts: Sequence[NDArray[np.float32]], count: int) -> Finding
     """Tell the layouts that a file of `count` values can have by its `sample`."""
     possible = [layout for layout in LAYOUTS if count % layout.width == 0]
     rows = {layout: _rows(parts, layout.width) for layout in possible}
-    fitting = [layout for layout in possible if layout.fits(rows[layout].T)]
+    fitting = [layout for layout in possible if layout.fits([*rows[layout].T])]
     # What only such rows have, as normals of the length 1, says more than where values are alike.
     proven = [layout for layout in fitting if _chance(layout, rows[layout], parts, marks=True) < _CHANCE]
     if len({layout.width for layout in proven}) == 1:
@@ -180,7 +180,9 @@ def fitting_layouts(parts: Sequence[NDArray[np.float32]], count: int) -> Finding
 def _strictest(layouts: Sequence[RowLayout]) -> RowLayout:
     """Choose among layouts of one length: a ring could be a time as well, a normal nothing else."""
     order = ("time", "intensity", "ring", "red", "nx")
-    return max(layouts, key=lambda layout: max((order.index(n) for n in layout.names if n in order), default=-1))
+    return max(
+        layouts, key=lambda layout: max((order.index(n) for n in layout.names if n in order), default=-1)
+    )
 
 
 def _rows(parts: Sequence[NDArray[np.float32]], width: int) -> NDArray[np.float32]:
@@ -197,7 +199,7 @@ def _chance(
     """
     if "nx" in layout.names:
         # Points on a sphere of radius 1 have this length as well.
-        others = np.abs(_squared_lengths(rows.T[:3]) - 1) > _LENGTH_TOLERANCE
+        others = np.abs(_squared_lengths([*rows.T[:3]]) - 1) > _LENGTH_TOLERANCE
         return -_DIGITS_OF_LENGTH * int(np.count_nonzero(others))
     values = np.concatenate(list(parts))
     exponent = 0.0
@@ -215,7 +217,7 @@ def _chance(
 
 
 def _by_structure(parts: Sequence[NDArray[np.float32]], count: int) -> tuple[set[int], bool]:
-    """Give the lengths of rows at which each place has values of one kind, and whether others are ruled out."""
+    """Give the lengths of rows at which each place has its own kind of value, and whether others are not."""
     possible = [width for width in (*range(3, 7), *_LONGER) if count % width == 0]
     explained = {width: _explained(parts, width) for width in possible}
     best = max((share for share, clear in explained.values() if clear), default=0.0)
@@ -237,7 +239,7 @@ def _by_structure(parts: Sequence[NDArray[np.float32]], count: int) -> tuple[set
 
 
 def _explained(parts: Sequence[NDArray[np.float32]], width: int) -> tuple[float, bool]:
-    """Say how much the place in a row tells of a value (mean square contingency), and whether that is clear."""
+    """Say how much the place in a row tells of a value (mean square contingency), and if that is clear."""
     values = np.concatenate(list(parts))
     number = min(_CLASSES, len(values) // (_FEWEST_EXPECTED * width))
     if number < 2:

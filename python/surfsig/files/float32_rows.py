@@ -1,4 +1,4 @@
-"""Rows of float32 without a header (.bin): x y z, KITTI's with intensity, nuScenes' with a ring, and others."""
+"""Rows of float32 without a header (.bin): x y z, KITTI's with intensity, nuScenes' with a ring, others."""
 
 from __future__ import annotations
 
@@ -22,9 +22,7 @@ _FLOAT_BYTES = 4
 _HINT = 'columns="x,y,z,intensity" names the values of a row'
 
 
-def read(
-    file: BinaryIO, source: str, progress: Progress, columns: Sequence[str] | None = None
-) -> PointCloud:
+def read(file: BinaryIO, source: str, progress: Progress, columns: Sequence[str] | None = None) -> PointCloud:
     """Read an open file of float32 rows of three to six values, or of those that `columns` names.
 
     How long a row is follows from what the numbers can be: coordinates are finite and below 1,000 km, an
@@ -47,7 +45,8 @@ def read(
         layout, names = None, tuple(columns)
         if size % (_FLOAT_BYTES * len(names)):
             raise InvalidInputError(
-                f"{source}: has {size} bytes, which are no whole rows of {len(names)} float32, as 'columns' names"
+                f"{source}: has {size} bytes, which are no whole rows of {len(names)} float32, as 'columns' "
+                "names"
             )
     # Names of what is left out must differ too.
     dtype = np.dtype([(f"_{i}" if name in LEFT_OUT else name, "<f4") for i, name in enumerate(names)])
@@ -76,8 +75,8 @@ def _layout(file: BinaryIO, size: int, source: str) -> RowLayout:
         return found.layouts[0]
     if not all((np.isfinite(part) & (np.abs(part) < FARTHEST)).all() for part in parts):
         raise FileFormatError(
-            f"{source}: holds no rows of float32 that are known: numbers are not finite, or {FARTHEST:g} or more; "
-            f"{_HINT}"
+            f"{source}: holds no rows of float32 that are known: numbers are not finite, or {FARTHEST:g} or "
+            f"more; {_HINT}"
         )
     fits = [f"{count // each.width} of {each.told}" for each in found.layouts]
     known = {each.width for each in found.layouts}
@@ -85,7 +84,9 @@ def _layout(file: BinaryIO, size: int, source: str) -> RowLayout:
     if not fits:
         told = "; ".join(each.told for each in LAYOUTS)
         raise FileFormatError(f"{source}: its {count} numbers fit no known row of float32 ({told}): {_HINT}")
-    raise FileFormatError(f"{source}: cannot tell what its rows of float32 are ({', or '.join(fits)}): {_HINT}")
+    raise FileFormatError(
+        f"{source}: cannot tell what its rows of float32 are ({', or '.join(fits)}): {_HINT}"
+    )
 
 
 def _check(columns: list[NDArray[Any]], layout: RowLayout, source: str) -> None:
@@ -95,6 +96,8 @@ def _check(columns: list[NDArray[Any]], layout: RowLayout, source: str) -> None:
     low, high = 0, len(columns[0])
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (middle, high) if layout.fits([values[low:middle] for values in columns]) else (low, middle)
+        low, high = (
+            (middle, high) if layout.fits([values[low:middle] for values in columns]) else (low, middle)
+        )
     shown = " ".join(f"{values[low]:.9g}" for values in columns)
     raise FileFormatError(f"{source}: row {low} ({shown}) cannot be {layout.told}: {_HINT}")

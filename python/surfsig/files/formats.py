@@ -148,10 +148,6 @@ def _is_pts(look: Look) -> bool:
     return _is_text(look) and _COUNTED.match(look.head) is not None
 
 
-def _is_csv(look: Look) -> bool:
-    return _is_text(look) and look.extension == ".csv"
-
-
 def _function(of: Callable[..., Any] | str) -> Any:
     """Give a function, imported now where it is named: MODULE:FUNCTION of this package."""
     if not isinstance(of, str):
@@ -164,9 +160,14 @@ def _function(of: Callable[..., Any] | str) -> Any:
 _LAZ = re.compile(rb"LASF.{100}[\x80-\xff]", re.DOTALL)
 
 # The number of points stands above them; CloudCompare names the columns first.
-_COUNTED = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s*//[^\r\n]*)*\s*\d+[ \t]*[\r\n]")
+_COUNTED = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s*//[^\r\n]*[\r\n])*\s*\d+[ \t]*[\r\n]")
+
+# Its second line counts vertices and faces, and would be a point.
+_OFF = re.compile(rb"\s*(?:ST)?C?N?4?n?OFF\b")
 
 _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
+
+_OF_TEXT = ("columns", "unit")
 
 # The order matters: text comes last, because every PCD header and every HTML page is text as well; before it
 # those that have no mark of their own.
@@ -199,6 +200,7 @@ FORMATS = (
     Format("PDF", (".pdf",), _begins(b"%PDF")),
     Format("gzip archive", (".gz",), _begins(b"\x1f\x8b")),
     Format("binary glTF", (".glb",), _begins(b"glTF")),
+    Format("OFF", (".off",), _matches(_OFF)),
     Format("HDF5", (".h5", ".hdf5"), _begins(b"\x89HDF")),
     Format("web page or XML", (".html", ".htm", ".xml"), _matches(_HTML)),
     # A binary file may begin with "solid" too.
@@ -207,11 +209,10 @@ FORMATS = (
     Format("float32 rows", (".bin",), _is_float32_rows, float32_rows.read, takes=("columns",)),
     Format("OBJ", (".obj",), _is_obj, obj.read, takes=("samples",)),
     Format("PTX", (".ptx",), _is_ptx, ptx.read, takes=("scan",)),
-    Format("PTS", (".pts",), _is_pts, text.read, takes=("columns", "scan", "unit")),
-    Format("CSV", (".csv",), _is_csv, text.read, text_write.write_csv, takes=("columns", "unit")),
-    Format(
-        "text", (".xyz", ".txt", ".asc"), _is_text, text.read, text_write.write_plain, takes=("columns", "unit")
-    ),
+    Format("PTS", (".pts",), _is_pts, text.read, takes=(*_OF_TEXT, "scan")),
+    Format("text", (".xyz", ".txt", ".asc"), _is_text, text.read, text_write.write_plain, takes=_OF_TEXT),
+    # Read as any other text, and written otherwise.
+    Format("CSV", (".csv",), lambda look: False, write=text_write.write_csv),
 )
 
 

@@ -160,7 +160,8 @@ def parse(
     delimiter
         What stands between two values; None is white space.
     comments
-        Lines that begin with ``#``, ``//`` or ``%`` are skipped, and what follows a blank and ``#`` or ``//``.
+        Lines that begin with ``#``, ``//`` or ``%`` are skipped, and what follows a blank and ``#`` or
+        ``//``.
     decimal_comma
         Numbers are written as 1,25.
     kept
@@ -209,9 +210,10 @@ def fault(
     if not tokens:
         return None
     for i in range(width) if kept is None else kept:
-        if i < len(tokens) and not is_number(tokens[i], decimal_comma):
-            if delimiter is None or not is_missing(tokens[i]):
-                return why_no_number(tokens[i], decimal_comma), False
+        token = tokens[i] if i < len(tokens) else "0"
+        missing = delimiter is not None and is_missing(token)
+        if not missing and not is_number(token, decimal_comma):
+            return why_no_number(token, decimal_comma), False
     if len(tokens) != width:
         return f"{len(tokens)} values where {width} are expected", len(tokens) < width
     return None
@@ -244,9 +246,7 @@ def cells_of(text: str, delimiter: str | None) -> list[str]:
         return [cell.strip() for cell in text.split(delimiter)]
 
 
-def tokens_of(
-    line: str, delimiter: str | None, comments: bool = True, width: int | None = None
-) -> list[str]:
+def tokens_of(line: str, delimiter: str | None, comments: bool = True, width: int | None = None) -> list[str]:
     """Cut a line into its values; a delimiter behind the last of them (of `width`, if given) adds none."""
     text = content(line, comments, delimiter)
     tokens = cells_of(text, delimiter) if text else []
@@ -324,7 +324,7 @@ def _repaired(
     decimal_comma: bool,
     kept: Sequence[int] | None,
 ) -> list[str] | None:
-    """Give the columns that are kept as NumPy reads them, with tabs between the values if there is a delimiter.
+    """Give the columns that are kept as NumPy reads them, with tabs between values if there is a delimiter.
 
     None if a line has not `width` values.
     """

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-# NaN as C, C++, Java, Python and Windows' runtime write it. The last cuts "1.#QNAN" and "1.#IND" off where few
-# digits are asked for, and rounds the letters: 1.#QNB, 1.#IO, 1.#J, 1.$.
+# NaN as C, C++, Java, Python and Windows' runtime write it. The last cuts "1.#QNAN" and "1.#IND" off where
+# few digits are asked for, and rounds the letters: 1.#QNB, 1.#IO, 1.#J, 1.$.
 _NAN = r"[-+]?(?:nan(?:\(\w*\))?|[qs]nan|nan[qs]|1[.,](?:#[a-z]+0*|\$))"
 # What stands in a cell without a value: databases, Python, R, spreadsheets, pandas.
 _MISSING = r"null|\\n|none|nil|n/a|#n/a|na|<na>|missing"

@@ -216,9 +216,7 @@ def _one_line(error: Exception) -> str:
     return " ".join(str(error).split())[:100]
 
 
-def _cloud_from_array(
-    array: NDArray[Any], source: str, columns: Sequence[str] | None = None
-) -> PointCloud:
+def _cloud_from_array(array: NDArray[Any], source: str, columns: Sequence[str] | None = None) -> PointCloud:
     if array.dtype.names:
         if columns is not None:
             raise InvalidInputError(f"{source}: its columns have names, for which 'columns' means nothing")

@@ -41,19 +41,19 @@ def column_names(columns: str | Sequence[str]) -> tuple[str, ...]:
     try:
         names = tuple(str(name).strip() for name in given)
     except TypeError:
-        raise InvalidInputError(f"columns must be names such as \"x,y,z\", not {columns!r:.40}") from None
+        raise InvalidInputError(f'columns must be names such as "x,y,z", not {columns!r:.40}') from None
     # Coordinates are known in any case, and so are twice the same.
     lower = [name.lower() for name in names if name not in LEFT_OUT]
     if not all(lower) or len(set(lower)) < len(lower) or not {"x", "y", "z"} <= set(lower):
         raise InvalidInputError(
-            f"columns must be a name for each column, x, y and z among them and none twice (_ leaves one out), "
+            "columns must be a name for each column, x, y, z among them and none twice (_ leaves one out), "
             f"not {','.join(names)[:80]!r}"
         )
     return names
 
 
 def check_width(columns: Sequence[str], width: int, source: str) -> None:
-    """Make sure that there is a name for each of a file's `width` columns; an `InvalidInputError` says how many."""
+    """Make sure that each of a file's `width` columns has a name; an `InvalidInputError` says how many."""
     if len(columns) != width:
         raise InvalidInputError(f"{source}: has {width} columns, and 'columns' names {len(columns)}")
 

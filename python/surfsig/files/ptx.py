@@ -53,7 +53,8 @@ class _Scan:
         width = self.blocks[0].shape[1] if self.blocks else len(lines[0].split())
         if width not in _NAMES:
             raise FileFormatError(
-                f"{source}: line {first}: {width} values where a point of PTX has {', '.join(map(str, _NAMES))}"
+                f"{source}: line {first}: {width} values where a point of PTX has "
+                f"{', '.join(map(str, _NAMES))}"
             )
         self.blocks.append(parse(lines, np.float64, width, source=source, first=first))
         self.left -= count
@@ -113,7 +114,9 @@ def _begun(rows: list[NDArray[np.float64]], source: str, number: int) -> _Scan:
     """Understand the lines above a scan's points, of which the last has this number."""
     columns, height = float(rows[0][0]), float(rows[1][0])
     if not (0 <= columns < _MOST_ROWS and 0 <= height < _MOST_ROWS and columns % 1 == height % 1 == 0):
-        raise FileFormatError(f"{source}: line {number - 9}: a scan of {columns:g} x {height:g} points is none")
+        raise FileFormatError(
+            f"{source}: line {number - 9}: a scan of {columns:g} x {height:g} points is none"
+        )
     matrix = np.array(rows[6:])
     if not (np.isfinite(matrix).all() and np.isfinite(rows[2]).all()):
         raise FileFormatError(f"{source}: line {number - 3}: the pose of the scan is not finite")

@@ -1,4 +1,4 @@
-"""XYZ, CSV, TXT, ASC, PTS: a point per line, with white space, commas, semicolons or tabs between the numbers."""
+"""XYZ, CSV, TXT, ASC, PTS: a point per line, with white space, commas, semicolons or tabs between numbers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
 from surfsig.files.columns import cloud_from_columns
-from surfsig.files.lines import Block, content, decoded, fault, line_blocks, parse, warn_dropped, warn_unterminated
+from surfsig.files.lines import (
+    Block,
+    content,
+    decoded,
+    fault,
+    line_blocks,
+    parse,
+    warn_dropped,
+    warn_unterminated,
+)
 from surfsig.files.progress import Progress
 from surfsig.files.scans import joined, scan_number
 from surfsig.files.text_layout import Layout, count_of, layout_of
@@ -132,8 +141,9 @@ def _without_bad_end(blocks: Iterator[Block], layout: Layout, source: str) -> It
             raise FileFormatError(f"{source}: cut off: its list of points has no closing bracket")
         yield waiting
         return
-    last = max(
-        (i for i, line in enumerate(waiting.lines) if content(line, True, layout.delimiter)), default=None
+    last = next(
+        (i for i in reversed(range(len(waiting.lines))) if content(waiting.lines[i], True, layout.delimiter)),
+        None,
     )
     if last is not None:
         wrong = fault(

@@ -1,36 +1,36 @@
-"""How the lines of a text file are to be read: where its rows begin, what is between values, who is x, y, z."""
+"""How the lines of a text file are to be read: where rows begin, what is between values, what is x, y, z."""
 
 from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surfsig.errors import FileFormatError, InvalidInputError
-from surfsig.files.columns import unique_name
-from surfsig.files.coordinate_names import coordinates_of, is_unit
-from surfsig.files.first_columns import first_columns, is_running, names_of_counted
-from surfsig.files.lines import COMMENT_MARKS, cells_of, content, fault, split_lines, tokens_of
-from surfsig.files.options import LEFT_OUT, check_width
+from surfsig.errors import FileFormatError
+from surfsig.files.coordinate_names import coordinates_of
+from surfsig.files.first_columns import first_columns, names_of_counted
+from surfsig.files.lines import cells_of, content, fault, split_lines, tokens_of
 from surfsig.files.number_words import (
     has_decimal_comma,
     has_decimal_point,
     has_thousands,
     is_missing,
-    is_number,
     may_be_thousands,
     why_no_number,
 )
+from surfsig.files.options import LEFT_OUT, check_width
+from surfsig.files.text_header import are_words, is_comment, is_value, names_above, unique_names
 from surfsig.files.text_notes import viewpoint_of
 
-# Lines of words above the first row: titles, names, units. With more of them it is prose.
-_MOST_HEADER_LINES = 30
+# Lines of words above the first row: titles, names, units. With more of them it is prose; where none of them
+# names coordinates, more than a title is the beginning of another format (an ESRI grid, ...).
+_MOST_HEADER_LINES, _MOST_TITLE_LINES = 30, 1
 # Lines that the layout is judged by.
-_SAMPLE_LINES = 1000
+_SAMPLE_LINES = 300
 _DELIMITERS = (None, "\t", ";", ",")
 # Excel reads this line as which delimiter follows.
 _SEPARATOR_LINE = re.compile(r"sep=(.)\s*$", re.IGNORECASE)
@@ -143,11 +143,11 @@ def layout_of(head: bytes, whole: bool, source: str, columns: Sequence[str] | No
     above = [
         (number, line) for number, line in enumerate(shown[: best.first]) if number >= start and line.strip()
     ]
-    if len(above) > _MOST_HEADER_LINES and any(not _is_comment(line) for _, line in above):
+    if len(above) > _MOST_HEADER_LINES and any(not is_comment(line) for _, line in above):
         raise FileFormatError(f"{source}: {_why_not_points(shown, start)}")
     layout = _described(best, [line for _, line in above], source, columns)
     layout.brackets = brackets
-    layout.viewpoint = viewpoint_of(line for _, line in above if _is_comment(line))
+    layout.viewpoint = viewpoint_of(line for _, line in above if is_comment(line))
     return layout
 
 
@@ -158,49 +158,46 @@ def count_of(line: str) -> int | None:
 
 def _after_brackets(lines: Sequence[str]) -> int:
     for number, line in enumerate(lines):
-        if line.strip() and not _is_comment(line):
+        if line.strip() and not is_comment(line):
             return number + 1 if _MAPLE.match(line.strip()) else 0
     return 0
 
 
-def _is_comment(line: str) -> bool:
-    return line.lstrip().startswith(COMMENT_MARKS)
-
-
 def _table(lines: Sequence[str], start: int, delimiter: str | None) -> _Table | None:
     """Find the rows that this delimiter gives; None if it gives none."""
-    cut: list[tuple[int, list[str]]] = []
+    numbers: list[int] = []
+    cut: list[list[str]] = []
     for number in range(start, len(lines)):
         text = content(lines[number], True, delimiter)
         if text:
-            cut.append((number, cells_of(text, delimiter)))
+            numbers.append(number)
+            cut.append(cells_of(text, delimiter))
         if len(cut) == _SAMPLE_LINES:
             break
-    for place, (number, cells) in enumerate(cut):
-        following = cut[place + 1][1] if place + 1 < len(cut) else None
-        if not _is_row(cells, following, [row for _, row in cut[place + 1 :]]):
+    for place, cells in enumerate(cut):
+        if not _is_row(cut, place):
             continue
         kinds = _numeric(cells)
         words = kinds.count(False)
-        same = [row for _, row in cut[place:] if len(row) == len(cells)]
+        same = [row for row in cut[place:] if len(row) == len(cells)]
         if delimiter is None and words and (2 * words > len(cells) or len(same) < 2):
             # A sentence with three numbers in it.
             return None
-        fitting = sum(1 for row in same if _fits(row, kinds)) / len(cut[place:])
-        return _Table(delimiter, number, same, words, fitting)
+        fitting = sum(1 for row in same if _fits(row, kinds)) / (len(cut) - place)
+        return _Table(delimiter, numbers[place], same, words, fitting)
     return None
 
 
-def _is_row(cells: list[str], following: list[str] | None, rest: list[list[str]]) -> bool:
+def _is_row(cut: list[list[str]], place: int) -> bool:
     """Tell whether the cells of a line are a point's and not a title, names or units."""
+    cells = cut[place]
     if len(cells) < 3:
         return False
     kinds = _numeric(cells)
-    numbers = sum(1 for cell in cells if cell and _is_value(cell))
+    numbers = sum(1 for cell in cells if cell and is_value(cell))
     if all(kinds):
-        return numbers > 0 and not _are_numbers_of_columns(cells, rest)
-    fits = following is None or (len(following) == len(cells) and _fits(following, kinds))
-    return numbers >= 3 and fits
+        return numbers > 0 and not _are_numbers_of_columns(cells, cut[place + 1 :])
+    return numbers >= 3 and (place + 1 == len(cut) or _fits(cut[place + 1], kinds))
 
 
 def _are_numbers_of_columns(cells: list[str], rest: list[list[str]]) -> bool:
@@ -212,26 +209,22 @@ def _are_numbers_of_columns(cells: list[str], rest: list[list[str]]) -> bool:
     return not cells[0] or all(has_decimal_point(cell) for row in rest for cell in row[:3])
 
 
-def _is_value(cell: str) -> bool:
-    return is_number(cell) or has_decimal_comma(cell)
-
-
 def _numeric(cells: list[str]) -> list[bool]:
-    return [_is_value(cell) or is_missing(cell) for cell in cells]
+    return [is_value(cell) or is_missing(cell) for cell in cells]
 
 
 def _fits(row: list[str], kinds: list[bool]) -> bool:
     """Tell whether a row has numbers where another has them."""
     if len(row) != len(kinds):
         return False
-    return all(not kind or _is_value(cell) or is_missing(cell) for cell, kind in zip(row, kinds, strict=True))
+    return all(not kind or is_value(cell) or is_missing(cell) for cell, kind in zip(row, kinds, strict=True))
 
 
 def _described(table: _Table, above: list[str], source: str, columns: Sequence[str] | None) -> Layout:
     """Name the columns, and say which hold numbers."""
     rows = table.rows
     width = len(rows[0])
-    header = _header(above, table.delimiter, rows, source) if columns is None else None
+    header = names_above(above, table.delimiter, rows, source) if columns is None else None
     names = len(columns) if columns is not None else len(header or ())
     named = columns is not None or (header is not None and bool(header[-1]))
     if width > 3 and not any(row[-1] for row in rows) and not (names == width and named):
@@ -239,7 +232,7 @@ def _described(table: _Table, above: list[str], source: str, columns: Sequence[s
         width -= 1
         rows = [row[:-1] for row in rows]
         header = None if header is None else header[:width]
-    words = [i for i in range(width) if _are_words([row[i] for row in rows])]
+    words = [i for i in range(width) if are_words([row[i] for row in rows])]
     _refuse_blanks_and_commas([rows[0][i] for i in words], source, table.first)
     kept = [i for i in range(width) if i not in words]
     numbers = [[row[i] for i in kept] for row in rows]
@@ -253,7 +246,7 @@ def _described(table: _Table, above: list[str], source: str, columns: Sequence[s
         _refuse_words([i for i in words if i in layout.kept], layout, rows, source)
         return layout
     if header is not None:
-        layout.names = _unique(header + [""] * (width - len(header)))
+        layout.names = unique_names(header + [""] * (width - len(header)))
         found = coordinates_of(layout.names, source)
         if found is None:
             raise FileFormatError(
@@ -264,8 +257,16 @@ def _described(table: _Table, above: list[str], source: str, columns: Sequence[s
     elif counts and not words:
         layout.names = names_of_counted(numbers)
     else:
+        titles = [line for line in above if not is_comment(line) and count_of(line) is None]
+        if len(titles) > _MOST_TITLE_LINES:
+            raise FileFormatError(
+                f"{source}: not a table of points: {len(titles)} lines of words begin it "
+                f"({titles[0].strip()[:40]!r}), and none names coordinates; {_columns_hint(width)} does"
+            )
         layout.names = [f"column_{i + 1}" for i in range(width)]
-        for axis, place in zip("xyz", first_columns(numbers, kept, _columns_hint(width), source), strict=True):
+        for axis, place in zip(
+            "xyz", first_columns(numbers, kept, _columns_hint(width), source), strict=True
+        ):
             layout.names[place] = axis
     if words:
         told = ", ".join(f"'{layout.names[i]}'" for i in words)
@@ -273,73 +274,10 @@ def _described(table: _Table, above: list[str], source: str, columns: Sequence[s
     return layout
 
 
-def _header(above: list[str], delimiter: str | None, rows: list[list[str]], source: str) -> list[str] | None:
-    """Find the names of the columns above the rows, in a line or in a comment.
-
-    A line that names coordinates counts before any other with a name per column, and the nearest to the
-    rows before those further up.
-    """
-    width = len(rows[0])
-    nameless: list[str] | None = None
-    for line in reversed(above):
-        comment = _is_comment(line)
-        text = line.strip().lstrip("#/% \t!") if comment else content(line, False, delimiter)
-        for cells in _names_in(text, delimiter, comment):
-            if all(map(is_unit, cells)) and any(cells):
-                continue
-            if len(cells) == width - 1 and width > 3 and _are_row_names([row[0] for row in rows]):
-                # R gives no name to the column of the rows' names.
-                cells = ["row", *cells]
-            if not 3 <= len(cells) <= width or (comment and len(cells) != width):
-                continue
-            if coordinates_of(_unique(cells), source) is not None:
-                return cells
-            if nameless is None and not comment and len(cells) == width:
-                nameless = cells
-    return nameless
-
-
-def _names_in(text: str, delimiter: str | None, comment: bool) -> Iterator[list[str]]:
-    """Cut a line into names, by the rows' delimiter first; a comment may use another, and begin with a word."""
-    marks = [delimiter]
-    if comment:
-        marks += [",", ";", "\t", None]
-    elif delimiter is None:
-        # Names of several words.
-        marks.append("\t")
-    for mark in marks:
-        yield [cell.strip("\"'") for cell in cells_of(text, mark)]
-    if comment:
-        for mark in ":=":
-            if mark in text:
-                yield text.partition(mark)[2].replace(",", " ").split()
-
-
-def _are_row_names(cells: list[str]) -> bool:
-    return _are_words(cells) or is_running(cells)
-
-
-def _are_words(cells: list[str]) -> bool:
-    """Tell whether most of a column's values are no numbers; single ones are taken for damage."""
-    there = [cell for cell in cells if not is_missing(cell)]
-    return 2 * sum(1 for cell in there if not _is_value(cell)) > len(there)
-
-
-def _unique(names: Sequence[str]) -> list[str]:
-    """Name what has no name, or one that is taken, by its place."""
-    unique: list[str] = []
-    taken: set[str] = set()
-    for i, name in enumerate(names):
-        known = not name or name.lower() in taken
-        unique.append(unique_name(f"column_{i + 1}", taken) if known else name)
-        taken.add(unique[-1].lower())
-    return unique
-
-
 def _refuse_words(places: Sequence[int], layout: Layout, rows: list[list[str]], source: str) -> None:
     """Refuse columns of words that must be read."""
     for i in places:
-        cell = next(row[i] for row in rows if not _is_value(row[i]) and not is_missing(row[i]))
+        cell = next(row[i] for row in rows if not is_value(row[i]) and not is_missing(row[i]))
         raise FileFormatError(f"{source}: column '{layout.names[i]}': {why_no_number(cell)}")
 
 
@@ -366,15 +304,17 @@ def _decimal_comma(rows: list[list[str]], source: str) -> bool:
     if all(map(may_be_thousands, commas)):
         whole, _, thousandths = commas[0].partition(",")
         raise FileFormatError(
-            f"{source}: {commas[0]!r} may be {whole}{thousandths}, by thousands, or {whole}.{thousandths}, with a "
-            "decimal comma: write decimal points"
+            f"{source}: {commas[0]!r} may be {whole}{thousandths}, by thousands, or {whole}.{thousandths}, "
+            "with a decimal comma: write decimal points"
         )
     return True
 
 
 def _columns_hint(width: int) -> str:
     names = ["x", "y", "z", "_", "_"][:width]
-    return f"columns=\"{','.join(names)}{',...' if width > 5 else ''}\" (a name for each of the {width} columns)"
+    return (
+        f'columns="{",".join(names)}{",..." if width > 5 else ""}" (a name for each of the {width} columns)'
+    )
 
 
 def _why_not_points(lines: Sequence[str], start: int) -> str:
