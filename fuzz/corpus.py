@@ -53,6 +53,26 @@ def table(delimiter: str = " ", head: str = "") -> bytes:
     return text.getvalue().encode()
 
 
+def words() -> bytes:
+    """Return a table with a title, units, quotes, missing values, and columns of words."""
+    head = 'Scan 12,,,,,\nname,X [m],Y [m],Z [m],"class, as text",i\n,[m],[m],[m],,\n'
+    rows = [
+        f'P{i},{x:.6g},"{y:.6g}",{z:.6g},"a, {i}",{i if i % 3 else "NULL"}\n' for x, y, z, i in ROWS.tolist()
+    ]
+    return (head + "".join(rows)).encode()
+
+
+def ptx(columns: int, rows: int) -> bytes:
+    """Return a scan of PTX with a pose, and a point that is missing."""
+    head = f"{columns}\n{rows}\n1 2 3\n0 1 0\n-1 0 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n1 2 3 1\n"
+    return head.encode() + table().replace(table().splitlines()[5], b"0 0 0 0.5")
+
+
+def binary_rows(*more: np.ndarray[Any, Any]) -> bytes:
+    """Return rows of float32 without a header: the points and further columns."""
+    return np.column_stack([POINTS, *more]).astype("<f4").tobytes()
+
+
 def ply(data: str) -> bytes:
     """Return a PLY mesh: a list property, and a comment."""
     axes = "".join(f"property float {name}\n" for name in ("x", "y", "z", "intensity"))
@@ -223,7 +243,22 @@ HAND_MADE: dict[str, tuple[Callable[[], bytes], dict[str, Any]]] = {
     "ascii.stl": (stl_ascii, {}),
     **meshes.MADE,
     "depth.png": (depth_png, {"intrinsics": (10.0, 10.0, 6.0, 4.0)}),
-    "kitti.bin": (lambda: ROWS.tobytes(), {}),
+    "words.csv": (words, {}),
+    "columns.csv": (words, {"columns": "_,x,y,z,_,i"}),
+    "comma.txt": (lambda: table().replace(b".", b","), {}),
+    "windows.xyz": (lambda: b"% made by hand\n" + table().replace(b"95\n", b"1.#QNAN\n"), {}),
+    "one.pts": (lambda: b"96\n" + table(), {}),
+    "two.pts": (lambda: b"96\n" + table() + b"96\n" + table(), {"scan": 1}),
+    "named.pts": (lambda: b"//X;Y;Z;Scalar field\n96\n" + table(";"), {}),
+    "one.ptx": (lambda: ptx(8, 12), {}),
+    "two.ptx": (lambda: ptx(8, 12) + ptx(96, 1), {}),
+    "chosen.ptx": (lambda: ptx(8, 12) + ptx(96, 1), {"scan": 1}),
+    "kitti.bin": (lambda: np.abs(ROWS).tobytes(), {}),
+    "three.bin": (lambda: (POINTS * np.array([30, 10, 0.1], np.float32)).tobytes(), {}),
+    "five.bin": (lambda: binary_rows(ROWS[:, 3] % 7, ROWS[:, 3] % 16), {}),
+    "six.bin": (lambda: binary_rows(*3 * [ROWS[:, 3]]), {}),
+    "named.bin": (lambda: ROWS.tobytes(), {"columns": "x,y,z,_"}),
+    "named.npy": (lambda: npy(ROWS), {"columns": "x,y,z,i"}),
 }  # fmt: skip
 
 

@@ -92,12 +92,24 @@ def test_options_reach_the_reader(
         return PointCloud(np.zeros((1, 3)))
 
     monkeypatch.setattr("surfsig.files.read", remember)
-    words = ("--scan", 2, "--samples", 70, "--intrinsics", "500,510,320,240.5", "--depth-scale", 5000)
+    words = (
+        "--columns",
+        "x,y,z",
+        "--scan",
+        2,
+        "--samples",
+        70,
+        "--intrinsics",
+        "500,510,320,240.5",
+        "--depth-scale",
+        5000,
+    )
     assert shell("convert", ball, tmp_path / "o.npz", *words).code == 0
     del asked["progress"]
     assert asked == {
         "unit": None,
         "box": None,
+        "columns": "x,y,z",
         "scan": 2,
         "samples": 70,
         "intrinsics": [500, 510, 320, 240.5],

@@ -228,8 +228,7 @@ def test_text_with_nan_and_infinity(tmp_path: Path) -> None:
         ("0 0 0\n1 2\n1 2 3\n", "line 2: 2 values where 3 are expected"),
         ("0 0 0\n1 2 3 4\n1 2 3\n", "line 2: 4 values where 3 are expected"),
         ("# c\n0 0 0\n\n1 two 3\n1 2 3\n", "line 4: 'two' is not a number"),
-        ("0,0,0\n1,,3\n1,2,3\n", "line 2: '' is not a number"),
-        ("1,5;2,5;3,5\n1,5;2,5;3,5\n", "decimal point, not a comma"),
+        ("0 0 0.5\n1 2 3\n1,5 2 3\n", "with a decimal comma .'1,5'. and with a point .'0.5'."),
         ("0 0 0\n1 2 3 4\n", "line 2: 4 values"),
         ("0 0 0\n1 x 3\n", "line 2: 'x' is not a number"),
         ("0 0\n1 2\n", "2 values where a point needs three"),
@@ -324,7 +323,7 @@ def test_real_scans(shared_data: Path) -> None:
 def test_every_cloud_of_the_shared_folder_is_read(shared_data: Path) -> None:
     suffixes = {".ply", ".pcd", ".xyz", ".txt"}
     for path in sorted(path for path in shared_data.rglob("*") if path.suffix in suffixes):
-        if path.stem.endswith(("_primitives", "_parametric", "_implicit")):
+        if path.stem.endswith(("_primitives", "_parametric", "_implicit", "README")):
             with pytest.raises(FileFormatError):
                 read(path)
             continue

@@ -56,7 +56,7 @@ QUANTILES = (0.05, 0.5, 0.95)
     "--output",
     type=CLOUD,
     required=True,
-    help="A .ply, .pcd, .las, .laz, .e57, .npz or .parquet file.",
+    help="A .ply, .pcd, .las, .laz, .e57, .npz, .parquet, .csv or .xyz file.",
 )
 @click.option("--signatures", is_flag=True, help="Write the signature of each point too (242 numbers).")
 @click.option(

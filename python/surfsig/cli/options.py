@@ -78,7 +78,14 @@ def input_options(command: Function) -> Function:
             metavar="X0,Y0,Z0,X1,Y1,Z1",
             help="Only the points between these corners, in the file's unit.",
         ),
-        click.option("--scan", type=int, metavar="N", help="Of an E57 file, only its scan N, from 0."),
+        click.option(
+            "--columns",
+            metavar="NAMES",
+            help="Of text and rows of float32: a name for each column, as x,y,z,intensity; _ leaves one out.",
+        ),
+        click.option(
+            "--scan", type=int, metavar="N", help="Of an E57, PTX or PTS file, only its scan N, from 0."
+        ),
         click.option(
             "--samples", type=int, metavar="N", help="Of a mesh, N points spread over it, not its vertices."
         ),
@@ -141,7 +148,7 @@ def json_option(command: Function) -> Function:
 
 def result_options(values: str, page: str) -> Callable[[Function], Function]:
     """Add -o, --json and --report; the words say what is written."""
-    formats = "A .ply, .pcd, .las, .laz, .e57, .npz or .parquet file."
+    formats = "A .ply, .pcd, .las, .laz, .e57, .npz, .parquet, .csv or .xyz file."
     options = [
         click.option("-o", "--output", type=CLOUD, help=formats),
         click.option(

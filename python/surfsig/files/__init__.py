@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files import formats
 from surfsig.files.atomic import check_target, replacing
 from surfsig.files.columns import Chunks, output_columns
-from surfsig.files.options import box_array, check_unit, cropped, in_metres, metres_per
+from surfsig.files.options import box_array, check_unit, column_names, cropped, in_metres, metres_per
 from surfsig.files.paths import Paths, files_meant
 from surfsig.files.progress import Progress, ProgressCallback
 from surfsig.files.sequence import ScanSequence, TimedScan, scan_sequence
@@ -55,6 +55,7 @@ def read(
     *,
     box: ArrayLike | None = None,
     unit: str | None = None,
+    columns: str | Sequence[str] | None = None,
     scan: int | None = None,
     samples: int | None = None,
     intrinsics: ArrayLike | None = None,
@@ -63,8 +64,8 @@ def read(
 ) -> PointCloud:
     """Read a point cloud.
 
-    From PLY, PCD, LAS, LAZ, COPC, E57, text (XYZ, CSV, TXT, ASC), NPY, NPZ, Parquet, STL, OBJ, OFF, glTF and
-    GLB, KITTI's .bin or a depth image (PNG of 16 bits).
+    From PLY, PCD, LAS, LAZ, COPC, E57, text (XYZ, CSV, TXT, ASC, PTS), PTX, NPY, NPZ, Parquet, STL, OBJ, OFF,
+    glTF and GLB, rows of float32 (KITTI's and nuScenes' .bin) or a depth image (PNG of 16 bits).
 
     Parameters
     ----------
@@ -79,8 +80,13 @@ def read(
     unit
         What the file's numbers are: "mm", "cm", "m", "km", "in", "ft" or "us-ft". The cloud is then in
         metres, and in no coordinate system; by default it stays as it is.
+    columns
+        Of text, rows of float32, and NPY (n, k): a name for each column of the file, such as
+        "x,y,z,intensity,ring" or ["_", "x", "y", "z"]; ``_`` leaves one out. By default the file's header
+        says, or what the numbers can be; a file of which that is not certain is refused.
     scan
-        Of an E57 file with several scans, the one with this number, from 0; by default all of them.
+        Of an E57, PTX or PTS file with several scans, the one with this number, from 0; by default all of
+        them.
     samples
         Of a mesh (OBJ, STL, PLY, OFF, glTF), this many points spread evenly over its surface, in place of
         its vertices.
@@ -110,9 +116,10 @@ def read(
     Warns
     -----
     UserWarning
-        If the last line of a text file is cut off (it is dropped) or may be, or values are left out that are
-        no numbers, or that not all of several files have. If the coordinates are degrees, in two units, or
-        not in the `unit` given. If the header contradicts the file, and one of the two is clearly right.
+        If the last line of a text file is cut off (it is dropped) or may be; if values are left out that are
+        no numbers, or that not all of several files have; if the coordinates are degrees, in two units, or
+        not in the `unit` given; if nobody named the columns and the first three may be no coordinates; if the
+        header contradicts the file, and one of the two is clearly right.
 
     Notes
     -----
@@ -123,16 +130,20 @@ def read(
     files = files_meant(path)
     if files is not None:
         asked: dict[str, Any] = {
-            "box": box, "unit": unit, "scan": scan, "samples": samples, "intrinsics": intrinsics,
-            "depth_scale": depth_scale,
+            "box": box, "unit": unit, "columns": columns, "scan": scan, "samples": samples,
+            "intrinsics": intrinsics, "depth_scale": depth_scale,
         }  # fmt: skip
         return read_several(files, lambda file, told: read(file, **asked, progress=told), progress)
     path = Path(path)  # type: ignore[arg-type]
     corners = None if box is None else box_array(box)
     metres = None if unit is None else metres_per(unit)
     options = {
-        "scan": scan, "samples": samples, "intrinsics": intrinsics, "depth_scale": depth_scale,
-    }  # fmt: skip
+        "columns": None if columns is None else column_names(columns),
+        "scan": scan,
+        "samples": samples,
+        "intrinsics": intrinsics,
+        "depth_scale": depth_scale,
+    }
     given = {name: value for name, value in options.items() if value is not None}
     with path.open("rb") as file:
         size = os.fstat(file.fileno()).st_size
@@ -142,6 +153,8 @@ def read(
                 raise InvalidInputError(f"{path}: holds {kind.name} data, for which '{name}' means nothing")
         if corners is not None and "box" in kind.takes:
             given["box"] = corners
+        if unit is not None and "unit" in kind.takes:
+            given["unit"] = unit
         file.seek(0)
         try:
             cloud = reader(file, str(path), Progress(progress, size), **given)
@@ -208,19 +221,21 @@ def write(
     notes: Mapping[str, str] | None = None,
     progress: ProgressCallback | None = None,
 ) -> None:
-    """Write a cloud with further columns: PLY, PCD, LAS, LAZ, E57, NPZ or Parquet, by the extension.
+    """Write a cloud with further columns: PLY, PCD, LAS, LAZ, E57, NPZ, Parquet or text, by the extension.
 
     The file appears whole or not at all: a failure (a full disk) leaves an old file as it was.
 
     Parameters
     ----------
     path
-        The file; ``.ply``, ``.pcd``, ``.las``, ``.laz``, ``.e57``, ``.npz`` or ``.parquet``.
+        The file; ``.ply``, ``.pcd``, ``.las``, ``.laz``, ``.e57``, ``.npz``, ``.parquet``, ``.csv``, or
+        ``.xyz``, ``.txt`` and ``.asc`` with blanks between the numbers.
     cloud
         Its points come first (in PLY and E57 as double where float would change one of them; in PCD, of which
         most readers take floats only, once more as doubles, and where float is too coarse about an origin; in
-        LAS and LAZ rounded to steps of 1e-3 to 1e-9, the finest that fit their extent), then its fields. In
-        E57 its viewpoint, or its viewpoints, become the poses of its scans. LAS, LAZ, PCD, NPZ and Parquet
+        LAS and LAZ rounded to steps of 1e-3 to 1e-9, the finest that fit their extent; in text with as few
+        digits as give back the same number in its type), then its fields. In E57 its viewpoint, or its
+        viewpoints, become the poses of its scans; CSV has no place for it. LAS, LAZ, PCD, NPZ and Parquet
         keep its coordinate system. Or what else `PointCloud.of` takes.
     columns
         (n,) or (n, k) numbers by name. ``normals`` (n, 3) are written as nx, ny, nz and ``colors`` (n, 3 or
@@ -231,7 +246,7 @@ def write(
         One more column, (n, width), given block by block so that it need not fit in memory.
     notes
         Words about the whole file (PLY and PCD comments, a record of LAS; as JSON in Parquet's metadata, the
-        array ``notes`` of NPZ, the description of an E57 scan).
+        array ``notes`` of NPZ, the description of an E57 scan, comments ``// surfsig`` of text but CSV).
     progress
         Called with the points written so far and their number.
 

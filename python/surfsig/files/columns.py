@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
 from surfsig.files.colours import with_colours
+from surfsig.files.coordinate_names import coordinates_of, warn_of_units
 from surfsig.point_cloud import PointCloud, plain_array
 
 # Coordinates printed as text and declared float32 stay float64 where float32 would move a point by more than
@@ -56,10 +57,12 @@ def cloud_from_columns(
     declared_float32: bool = False,
     decimals: Collection[str] | None = None,
     error: type[SurfsigError] = FileFormatError,
+    unit: str | None = None,
 ) -> PointCloud:
-    """Make a cloud of named columns: x, y, z in any case, or `points` (n, 3); the others are its fields.
+    """Make a cloud of named columns; those that are no coordinates are its fields.
 
-    Coordinates that lie in memory as (n, 3) are not copied.
+    Coordinates are x, y, z in any case, or `points` (n, 3), or what else `coordinate_names` knows (pos_x,
+    Easting, ...). Those that lie in memory as (n, 3) are not copied.
 
     Parameters
     ----------
@@ -76,7 +79,14 @@ def cloud_from_columns(
         Of text: the columns that are written with a decimal point, by which colours are told apart (see
         `with_colours`). None where the file has types.
     error
-        What is raised if a coordinate is missing or no number.
+        What is raised if a coordinate is missing, is no number, or may be several columns.
+    unit
+        What the caller says that the coordinates' unit is.
+
+    Warns
+    -----
+    UserWarning
+        If the coordinates' names give another unit than metres and `unit`.
     """
     by_lower_name = {name.lower(): name for name in reversed(list(columns))}
     points = columns.get(by_lower_name.get("points", ""))
@@ -89,12 +99,15 @@ def cloud_from_columns(
         rest = {name: values for name, values in columns.items() if name != by_lower_name["points"]}
         columns = {**dict(zip("xyz", points.T, strict=True)), **rest}
         by_lower_name |= {axis: axis for axis in "xyz"}
-    missing = [axis for axis in "xyz" if axis not in by_lower_name]
-    if missing:
+    single = [name for name, values in columns.items() if values.ndim == 1]
+    coordinates = coordinates_of(single, source, error)
+    if coordinates is None:
+        missing = next((axis for axis in "xyz" if axis not in by_lower_name), "x")
         raise error(
-            f"{source}: no column '{missing[0]}' among the point's values ({', '.join(columns) or 'none'})"
+            f"{source}: no column '{missing}' among the point's values ({', '.join(columns) or 'none'})"
         )
-    axes = [by_lower_name[axis] for axis in "xyz"]
+    warn_of_units(coordinates, source, unit)
+    axes = coordinates.names
     first = columns[axes[0]]
     for axis in axes:
         if columns[axis].dtype.kind not in "fiu":

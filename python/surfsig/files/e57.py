@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import operator
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfsig import _surfsig
-from surfsig.errors import FileFormatError, InvalidInputError
+from surfsig.errors import FileFormatError
 from surfsig.files.colours import with_colours
 from surfsig.files.e57_names import field_names
-from surfsig.files.joined import common_viewpoints
 from surfsig.files.progress import Progress
+from surfsig.files.scans import joined, scan_number
 from surfsig.point_cloud import PointCloud
 
 MAGIC = b"ASTM-E57"
@@ -41,16 +40,8 @@ def read(file: BinaryIO, source: str, progress: Progress, scan: int | None = Non
     if not len(reader):
         raise FileFormatError(f"{source}: the E57 file holds no scan")
     if scan is None:
-        return _joined([_scan(reader, number, source) for number in range(len(reader))])
-    try:
-        number = operator.index(scan)
-    except TypeError:
-        raise InvalidInputError(f"{source}: scan must be a whole number") from None
-    if not 0 <= number < len(reader):
-        raise InvalidInputError(
-            f"{source}: there is no scan {number}: the file holds {len(reader)}, numbered from 0"
-        )
-    return _scan(reader, number, source)
+        return joined([_scan(reader, number, source) for number in range(len(reader))])
+    return _scan(reader, scan_number(scan, len(reader), source), source)
 
 
 def _scan(reader: _surfsig.E57Reader, number: int, source: str) -> PointCloud:
@@ -134,25 +125,3 @@ def _grid(fields: dict[str, NDArray[Any]], count: int) -> tuple[int, int] | None
     places = np.arange(count)
     filled = np.array_equal(rows, places // width) and np.array_equal(columns, places % width)
     return (height, width) if filled else None
-
-
-def _joined(clouds: list[PointCloud]) -> PointCloud:
-    if len(clouds) == 1:
-        return clouds[0]
-    fields: dict[str, NDArray[Any]] = {
-        "scan": np.repeat(
-            np.arange(len(clouds), dtype=np.min_scalar_type(len(clouds) - 1)),
-            [len(cloud) for cloud in clouds],
-        )
-    }
-    names = dict.fromkeys(name for cloud in clouds for name in cloud.fields)
-    for name in names:
-        kind = np.result_type(*(cloud.fields[name].dtype for cloud in clouds if name in cloud.fields))
-        missing = np.nan if kind.kind == "f" else 0
-        parts = [cloud.fields.get(name, np.full(len(cloud), missing, kind)) for cloud in clouds]
-        fields["input_scan" if name == "scan" else name] = np.concatenate(parts, dtype=kind)
-    viewpoint, viewpoints = common_viewpoints(
-        [None if cloud.viewpoint is None else cloud.viewpoint[None] for cloud in clouds]
-    )
-    offsets = np.concatenate([cloud.offsets for cloud in clouds])
-    return PointCloud(offsets, viewpoint=viewpoint, viewpoints=viewpoints, fields=fields)

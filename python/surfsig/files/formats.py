@@ -17,8 +17,8 @@ from surfsig.files import (
     depth_image,
     e57,
     e57_writer,
+    float32_rows,
     gltf,
-    kitti,
     numpy_files,
     obj,
     off,
@@ -28,8 +28,10 @@ from surfsig.files import (
     pcd_write,
     ply,
     ply_header,
+    ptx,
     stl,
     text,
+    text_write,
 )
 from surfsig.files.columns import Chunks
 from surfsig.files.encodings import UTF16_MARKS, decoded_head
@@ -104,7 +106,8 @@ class Format:
     reserved
         Names that a column cannot have.
     takes
-        The options of `surfsig.read` that mean something to this format's reader.
+        The options of `surfsig.read` that mean something to this format's reader; any takes a box and a unit,
+        which are named here where it must know of them.
     """
 
     name: str
@@ -153,8 +156,17 @@ def _is_gltf(look: Look) -> bool:
     return text.startswith(b"{") and (look.extension == ".gltf" or b'"asset"' in text)
 
 
-def _is_kitti(look: Look) -> bool:
-    return look.extension == ".bin" and not _is_text(look) and kitti.is_plausible(look.head, look.size)
+def _is_float32_rows(look: Look) -> bool:
+    # Nothing but zeros is a file that was never filled.
+    return look.extension == ".bin" and not _is_text(look) and any(look.head)
+
+
+def _is_ptx(look: Look) -> bool:
+    return _is_text(look) and ptx.MAGIC.match(look.head) is not None
+
+
+def _is_pts(look: Look) -> bool:
+    return _is_text(look) and _COUNTED.match(look.head) is not None
 
 
 def _function(of: Callable[..., Any] | str) -> Any:
@@ -168,7 +180,12 @@ def _function(of: Callable[..., Any] | str) -> Any:
 # Bit 7 of the point format's number says that the points are compressed.
 _LAZ = re.compile(rb"LASF.{100}[\x80-\xff]", re.DOTALL)
 
+# The number of points stands above them; CloudCompare names the columns first.
+_COUNTED = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s*//[^\r\n]*[\r\n])*\s*\d+[ \t]*[\r\n]")
+
 _HTML = re.compile(rb"\s*<(!doctype|html|\?xml)", re.IGNORECASE)
+
+_OF_TEXT = ("columns", "unit")
 
 # The order matters: text comes last, because every PCD header and every HTML page is text as well; before it
 # those that have no mark of their own.
@@ -177,7 +194,7 @@ FORMATS = (
     Format(
         "PCD", (".pcd",), _matches(pcd_header.MAGIC), pcd.read, pcd_write.write, reserved=pcd_write.RESERVED
     ),
-    Format("NPY", (".npy",), _begins(numpy_files.NPY_MAGIC), numpy_files.read_npy),
+    Format("NPY", (".npy",), _begins(numpy_files.NPY_MAGIC), numpy_files.read_npy, takes=("columns",)),
     Format(
         "NPZ",
         (".npz",),
@@ -210,9 +227,13 @@ FORMATS = (
     Format("ASCII STL", (".stl",), _matches(stl.ASCII_MAGIC), stl.read_ascii, takes=("samples",)),
     Format("glTF", (".gltf",), _is_gltf, gltf.read, takes=("samples",)),
     Format("OFF", (".off",), _is_off, off.read, takes=("samples",)),
-    Format("KITTI", (".bin",), _is_kitti, kitti.read),
+    Format("float32 rows", (".bin",), _is_float32_rows, float32_rows.read, takes=("columns",)),
     Format("OBJ", (".obj",), _is_obj, obj.read, takes=("samples",)),
-    Format("text", (".xyz", ".csv", ".txt", ".asc"), _is_text, text.read),
+    Format("PTX", (".ptx",), _is_ptx, ptx.read, takes=("scan",)),
+    Format("PTS", (".pts",), _is_pts, text.read, takes=(*_OF_TEXT, "scan")),
+    Format("text", (".xyz", ".txt", ".asc"), _is_text, text.read, text_write.write_plain, takes=_OF_TEXT),
+    # Read as any other text, and written otherwise.
+    Format("CSV", (".csv",), lambda look: False, write=text_write.write_csv),
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -12,9 +13,15 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from surfsig.errors import FileFormatError
+from surfsig.files.number_words import in_one_spelling, is_missing, is_number, why_no_number
 from surfsig.files.progress import Progress
 
 BLOCK_BYTES = 1 << 22
+COMMENT_MARKS = ("#", "//", "%")
+# Behind values: "1.#QNAN" is a number, and "#N/A" is what a spreadsheet writes where there is none.
+_COMMENT_BEHIND = re.compile(r"\s(?:#(?!N/A)|//)")
+_QUOTED_WORDS = re.compile(r'"[^"]*"|[^\s"]+')
+_POINT = re.compile(r"\d\.|\.\d")
 
 
 @dataclass
@@ -121,84 +128,119 @@ def parse(
     first: int,
     delimiter: str | None = None,
     comments: bool = False,
+    decimal_comma: bool = False,
+    kept: Sequence[int] | None = None,
 ) -> NDArray[Any]:
     """Turn lines into rows of numbers.
+
+    NaN and infinity may be written in any of the ways of `number_words`; between two delimiters, nothing is
+    NaN.
 
     Parameters
     ----------
     lines
         One row each; empty ones are skipped.
     dtype
-        Of one number, which gives (m, width), or structured with `width` fields, which gives (m,).
+        Of one number, which gives (m, columns), or structured with `width` fields, which gives (m,).
     width
-        Numbers per line.
+        Values per line.
     source, first
         The file's name and the number of the first line, for messages.
     delimiter
-        What stands between two numbers; None is white space.
+        What stands between two values; None is white space.
     comments
-        Text after ``#`` or ``//`` is skipped.
+        Lines that begin with ``#``, ``//`` or ``%`` are skipped, and what follows a blank and ``#`` or
+        ``//``.
+    decimal_comma
+        Numbers are written as 1,25.
+    kept
+        The columns that hold numbers, all by default; the others are left out.
 
     Raises
     ------
     FileFormatError
-        Naming the first line that does not hold `width` numbers.
+        Naming the first line that does not hold `width` values, or another word where a number belongs.
     """
     structured = np.dtype(dtype).names is not None
-    marks: str | list[str] | None = None
-    if comments:
-        # Two marks make NumPy take a slow path, so the second is named only where it occurs.
-        marks = ["#", "//"] if any("//" in line for line in lines) else "#"
-    if not any(content(line, comments) for line in lines):
-        return np.empty(0 if structured else (0, width), dtype)
-    trailing = delimiter is not None
-    try:
-        rows = np.loadtxt(
-            lines,
-            dtype=dtype,
-            comments=marks,
-            delimiter=delimiter,
-            ndmin=1 if structured else 2,
-            usecols=range(width) if trailing and _ends_with(lines, delimiter, comments) else None,
-        )
-    except (ValueError, OverflowError) as error:
-        number, reason = _first_bad(lines, width, delimiter, comments) or (0, str(error))
-        where = f"line {first + number}"
-        raise FileFormatError(f"{source}: {where}: {reason}") from None
-    if not structured and rows.shape[1] != width:
-        number, reason = _first_bad(lines, width, delimiter, comments) or (0, "wrong number of columns")
-        raise FileFormatError(f"{source}: line {first + number}: {reason}")
-    return rows
+    columns = width if kept is None else len(kept)
+    if not any(content(line, comments, delimiter) for line in lines):
+        return np.empty(0 if structured else (0, columns), dtype)
+    rows = _plain_rows(lines, dtype, width, delimiter, decimal_comma, kept)
+    if rows is not None:
+        return rows
+    reason = "not a row of numbers"
+    repaired = _repaired(lines, width, delimiter, comments, decimal_comma, kept)
+    if repaired is not None:
+        mark = None if delimiter is None else "\t"
+        try:
+            rows = np.loadtxt(repaired, dtype, comments=None, delimiter=mark, ndmin=1 if structured else 2)
+        except (ValueError, OverflowError) as error:
+            reason = str(error)
+        else:
+            if structured or rows.shape[1] == columns:
+                return rows
+    for number, line in enumerate(lines):
+        wrong = fault(line, width, delimiter, comments, decimal_comma, kept)
+        if wrong is not None:
+            raise FileFormatError(f"{source}: line {first + number}: {wrong[0]}")
+    raise FileFormatError(f"{source}: line {first}: {reason}")
 
 
-def fault(line: str, width: int, delimiter: str | None, comments: bool) -> tuple[str, bool] | None:
+def fault(
+    line: str,
+    width: int,
+    delimiter: str | None,
+    comments: bool,
+    decimal_comma: bool = False,
+    kept: Sequence[int] | None = None,
+) -> tuple[str, bool] | None:
     """Say what is wrong with one line, and whether it only ends too early; None if nothing is."""
-    tokens = tokens_of(line, delimiter, comments)
+    tokens = tokens_of(line, delimiter, comments, width)
     if not tokens:
         return None
-    for token in tokens[:width]:
-        try:
-            float(token)
-        except ValueError:
-            hint = " (write a decimal point, not a comma)" if re.fullmatch(r"[-+]?\d+,\d+", token) else ""
-            return f"{token[:40]!r} is not a number{hint}", False
+    for i in range(width) if kept is None else kept:
+        token = tokens[i] if i < len(tokens) else "0"
+        missing = delimiter is not None and is_missing(token)
+        if not missing and not is_number(token, decimal_comma):
+            return why_no_number(token, decimal_comma), False
     if len(tokens) != width:
         return f"{len(tokens)} values where {width} are expected", len(tokens) < width
     return None
 
 
-def content(line: str, comments: bool) -> str:
+def content(line: str, comments: bool, delimiter: str | None = None) -> str:
     """Give the part of a line that holds values: without comment and white space around it."""
-    if comments:
-        line = line.partition("#")[0].partition("//")[0]
-    return line.strip()
+    # A tab at either end may stand beside an empty value.
+    text = line.strip(" \r\n") if delimiter == "\t" else line.strip()
+    if comments and text:
+        if text.lstrip().startswith(COMMENT_MARKS):
+            return ""
+        if "#" in text or "//" in text:
+            end = _COMMENT_BEHIND.search(text)
+            # Values behind it show that it is part of a word.
+            if end is not None and (delimiter is None or delimiter not in text[end.start() :].strip()):
+                return text[: end.start()].rstrip(" ")
+    return text
 
 
-def tokens_of(line: str, delimiter: str | None, comments: bool = True) -> list[str]:
-    """Cut a line into its values; a delimiter at the end adds none."""
-    text = content(line, comments)
-    tokens = [token.strip() for token in text.split(delimiter)] if text else []
-    return tokens[:-1] if tokens and not tokens[-1] else tokens
+def cells_of(text: str, delimiter: str | None) -> list[str]:
+    """Cut a line's content at its delimiters; those within quotes count for nothing."""
+    if '"' not in text:
+        return text.split() if delimiter is None else [cell.strip() for cell in text.split(delimiter)]
+    if delimiter is None:
+        return [word.strip('"') for word in _QUOTED_WORDS.findall(text)]
+    try:
+        return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))]
+    except csv.Error:
+        return [cell.strip() for cell in text.split(delimiter)]
+
+
+def tokens_of(line: str, delimiter: str | None, comments: bool = True, width: int | None = None) -> list[str]:
+    """Cut a line into its values; a delimiter behind the last of them (of `width`, if given) adds none."""
+    text = content(line, comments, delimiter)
+    tokens = cells_of(text, delimiter) if text else []
+    ends_empty = bool(tokens) and not tokens[-1] and len(tokens) != width
+    return tokens[:-1] if ends_empty else tokens
 
 
 def warn_dropped(source: str, number: int) -> None:
@@ -215,24 +257,80 @@ def warn_unterminated(source: str, number: int) -> None:
     )
 
 
-def _split(data: bytes) -> list[str]:
-    # Names were read from the header; among numbers, every byte that is not ASCII is an error anyway.
-    text = data.decode("latin-1")
+def split_lines(text: str) -> list[str]:
+    """Cut text at its line ends, whichever system's they are."""
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     return text.removesuffix("\n").split("\n")
 
 
-def _ends_with(lines: Sequence[str], delimiter: str | None, comments: bool) -> bool:
-    first = next(text for line in lines if (text := content(line, comments)))
-    return delimiter is not None and first.endswith(delimiter)
+def _split(data: bytes) -> list[str]:
+    # Names were read from the header; among numbers, every byte that is not ASCII is an error anyway.
+    return split_lines(data.decode("latin-1"))
 
 
-def _first_bad(
-    lines: Sequence[str], width: int, delimiter: str | None, comments: bool
-) -> tuple[int, str] | None:
-    for number, line in enumerate(lines):
-        found = fault(line, width, delimiter, comments)
-        if found is not None:
-            return number, found[0]
-    return None
+def _plain_rows(
+    lines: Sequence[str],
+    dtype: DTypeLike,
+    width: int,
+    delimiter: str | None,
+    decimal_comma: bool,
+    kept: Sequence[int] | None,
+) -> NDArray[Any] | None:
+    """Read lines that NumPy reads as they are; None if it does not."""
+    trailing = delimiter is not None and next(filter(str.strip, lines)).rstrip().endswith(delimiter)
+    if kept is not None or trailing:
+        # NumPy does not look at the columns that it leaves out.
+        if any('"' in line for line in lines):
+            return None
+        if delimiter is None:
+            found = {len(line.split()) for line in lines} - {0}
+        else:
+            found = {line.count(delimiter) + 1 for line in lines if line.strip()}
+        if found != {width + trailing} and found != {width}:
+            return None
+        kept = range(width) if kept is None else kept
+    if decimal_comma:
+        text = "\n".join(lines)
+        if "." in text or delimiter == ",":
+            return None
+        lines = text.replace(",", ".").split("\n")
+    structured = np.dtype(dtype).names is not None
+    try:
+        rows = np.loadtxt(
+            lines, dtype, comments=None, delimiter=delimiter, usecols=kept, ndmin=1 if structured else 2
+        )
+    except (ValueError, OverflowError):
+        return None
+    return rows if structured or rows.shape[1] == (width if kept is None else len(kept)) else None
+
+
+def _repaired(
+    lines: Sequence[str],
+    width: int,
+    delimiter: str | None,
+    comments: bool,
+    decimal_comma: bool,
+    kept: Sequence[int] | None,
+) -> list[str] | None:
+    """Give the columns that are kept as NumPy reads them, with tabs between values if there is a delimiter.
+
+    None if a line has not `width` values.
+    """
+    rows = []
+    for line in lines:
+        text = content(line, comments, delimiter)
+        if not text:
+            continue
+        if delimiter is not None or kept is not None or '"' in text:
+            cells = tokens_of(text, delimiter, False, width)
+            if len(cells) != width:
+                return None
+            text = "\t".join(cells if kept is None else [cells[i] for i in kept])
+        rows.append(text)
+    text = "\n".join(rows)
+    if decimal_comma:
+        if _POINT.search(text):
+            return None
+        text = text.replace(",", ".")
+    return in_one_spelling(text, tabs=delimiter is not None).split("\n")

@@ -8,7 +8,7 @@ import os
 import warnings
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import IO, Any, BinaryIO
 
@@ -25,6 +25,7 @@ from surfsig.files.columns import (
     cloud_from_columns,
     numeric_columns,
 )
+from surfsig.files.options import LEFT_OUT, check_width
 from surfsig.files.progress import Progress
 from surfsig.files.rows import filled
 from surfsig.point_cloud import PointCloud
@@ -39,17 +40,21 @@ MAX_DEFLATE_RATIO = 1032
 _BROKEN = (ValueError, EOFError, OSError, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError)
 
 
-def read_npy(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
+def read_npy(
+    file: BinaryIO, source: str, progress: Progress, columns: Sequence[str] | None = None
+) -> PointCloud:
     """Read an open NPY file: an array (n, 3 or more), or a structured one (n,) with fields x, y, z.
 
     Raises
     ------
     FileFormatError
         If it is cut off or no such array.
+    InvalidInputError
+        If `columns` does not name each column, or the array names them itself.
     """
     size = os.fstat(file.fileno()).st_size
     array = _read_array(file, size, source, progress)
-    return _cloud_from_array(array, source)
+    return _cloud_from_array(array, source, columns)
 
 
 def read_npz(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
@@ -216,8 +221,10 @@ def _one_line(error: Exception) -> str:
     return " ".join(str(error).split())[:100]
 
 
-def _cloud_from_array(array: NDArray[Any], source: str) -> PointCloud:
+def _cloud_from_array(array: NDArray[Any], source: str, columns: Sequence[str] | None = None) -> PointCloud:
     if array.dtype.names:
+        if columns is not None:
+            raise InvalidInputError(f"{source}: its columns have names, for which 'columns' means nothing")
         if array.ndim != 1:
             raise FileFormatError(
                 f"{source}: a structured array must have one axis, not the shape {array.shape}"
@@ -227,8 +234,11 @@ def _cloud_from_array(array: NDArray[Any], source: str) -> PointCloud:
         raise FileFormatError(f"{source}: points must be real numbers, not {array.dtype}")
     if array.ndim != 2 or array.shape[1] < 3:
         raise FileFormatError(f"{source}: points must have the shape (n, 3) or wider, not {array.shape}")
-    names = ["x", "y", "z", *(f"column_{i + 1}" for i in range(3, array.shape[1]))]
-    return cloud_from_columns({name: array[:, i] for i, name in enumerate(names)}, source=source)
+    names = columns or ["x", "y", "z", *(f"column_{i + 1}" for i in range(3, array.shape[1]))]
+    check_width(names, array.shape[1], source)
+    return cloud_from_columns(
+        {name: array[:, i] for i, name in enumerate(names) if name not in LEFT_OUT}, source=source
+    )
 
 
 def _grid(values: NDArray[Any] | None) -> tuple[int, int] | None:

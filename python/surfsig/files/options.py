@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -24,6 +25,39 @@ def metres_per(unit: str) -> float:
     if unit not in UNITS:
         raise InvalidInputError(f"unit must be one of {', '.join(UNITS)}, not {unit!r:.40}")
     return UNITS[unit]
+
+
+LEFT_OUT = ("_", "-")
+"""Names that leave a column out."""
+
+
+def column_names(columns: str | Sequence[str]) -> tuple[str, ...]:
+    """Check the names of a file's columns, "x,y,z,intensity" or a sequence, and return them one by one.
+
+    Raises
+    ------
+    InvalidInputError
+        If x, y or z is missing, or a name occurs twice.
+    """
+    given = columns.split(",") if isinstance(columns, str) else columns
+    try:
+        names = tuple(str(name).strip() for name in given)
+    except TypeError:
+        raise InvalidInputError(f'columns must be names such as "x,y,z", not {columns!r:.40}') from None
+    # Coordinates are known in any case, and so are twice the same.
+    lower = [name.lower() for name in names if name not in LEFT_OUT]
+    if not all(lower) or len(set(lower)) < len(lower) or not {"x", "y", "z"} <= set(lower):
+        raise InvalidInputError(
+            "columns must be a name for each column, x, y, z among them and none twice (_ leaves one out), "
+            f"not {','.join(names)[:80]!r}"
+        )
+    return names
+
+
+def check_width(columns: Sequence[str], width: int, source: str) -> None:
+    """Make sure that each of a file's `width` columns has a name; an `InvalidInputError` says how many."""
+    if len(columns) != width:
+        raise InvalidInputError(f"{source}: has {width} columns, and 'columns' names {len(columns)}")
 
 
 def box_array(box: ArrayLike) -> NDArray[np.float64]:

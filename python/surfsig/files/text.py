@@ -1,10 +1,9 @@
-"""XYZ, CSV, TXT, ASC: a point per line, with white space, commas, semicolons or tabs between the numbers."""
+"""XYZ, CSV, TXT, ASC, PTS: a point per line, with white space, commas, semicolons or tabs between numbers."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+import warnings
+from collections.abc import Iterator, Sequence
 from typing import BinaryIO
 
 import numpy as np
@@ -19,141 +18,114 @@ from surfsig.files.lines import (
     fault,
     line_blocks,
     parse,
-    tokens_of,
     warn_dropped,
     warn_unterminated,
 )
 from surfsig.files.progress import Progress
+from surfsig.files.scans import joined, scan_number
+from surfsig.files.text_layout import Layout, count_of, layout_of
 from surfsig.point_cloud import PointCloud
 
-_HEAD_BYTES = 1 << 16
-# Maple writes a list of points as "Points:=[", then "[x, y, z], " per line, then "];".
-_MAPLE = re.compile(r"\w+\s*:=\s*\[\s*$")
-_DECIMAL = re.compile(r"[.eE]")
-_BRACKETS = str.maketrans("[],;", "    ")
+# What the layout is told by: a thousand rows, or, where they are very wide, a few.
+_HEAD_BYTES, _MOST_HEAD_BYTES = 1 << 16, 1 << 22
+_HEAD_LINES = 8
 
 
-@dataclass
-class Layout:
-    """How the lines of a file are to be read.
-
-    Attributes
-    ----------
-    names
-        A name per column.
-    delimiter
-        What stands between two numbers; None is white space.
-    skip
-        Lines before the first point.
-    brackets
-        The numbers stand in Maple's brackets.
-    decimals
-        The columns whose first number is written with a decimal point or an exponent.
-    """
-
-    names: list[str]
-    delimiter: str | None
-    skip: int
-    brackets: bool
-    decimals: list[str]
-
-
-def read(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
+def read(
+    file: BinaryIO,
+    source: str,
+    progress: Progress,
+    *,
+    columns: Sequence[str] | None = None,
+    scan: int | None = None,
+    unit: str | None = None,
+) -> PointCloud:
     """Read an open text file.
 
-    Every line must hold the same number of values, at least three. Names come from a first line of words or
-    from a comment right above the points; x, y, z may then be any columns, otherwise they are the first
-    three. Further columns become fields (``column_4`` and so on where nothing names them). A last line that
-    is cut off is dropped, with a warning.
+    Every line must hold the same number of values, at least three. Names come from a line or a comment above
+    the points, or from `columns`; without any the first three are x, y, z, further ones ``column_4`` and so
+    on. What holds words is left out, with a warning. A last line that is cut off is dropped, with a warning.
+
+    Where a line with the number of points stands above them (PTS), more such lines begin further scans: they
+    are joined, with the field ``scan``, or `scan` chooses one.
 
     Raises
     ------
     FileFormatError
-        Naming the first line that cannot be understood.
+        Naming the first line that cannot be understood, or the columns that may be the coordinates.
+    InvalidInputError
+        If `columns` has not a name for each, or there is no such scan.
     """
     file = decoded(file)
     start = file.tell()
-    layout = _layout(file.read(_HEAD_BYTES), source)
+    head = part = file.read(_HEAD_BYTES)
+    while head.count(b"\n") < _HEAD_LINES and len(part) == _HEAD_BYTES and len(head) < _MOST_HEAD_BYTES:
+        head += (part := file.read(_HEAD_BYTES))
+    layout = layout_of(head, len(part) < _HEAD_BYTES, source, columns)
     file.seek(start)
-    blocks = [
-        _parse_block(block, layout, source)
-        for block in _without_bad_end(line_blocks(file, 1, progress), layout, source)
-    ]
-    table = np.concatenate(blocks)
-    return cloud_from_columns(
-        {name: table[:, i] for i, name in enumerate(layout.names)}, source=source, decimals=layout.decimals
+    tables = _tables(file, layout, source, progress)
+    _warn_of_counts(tables, source)
+    if scan is not None:
+        tables = [tables[scan_number(scan, len(tables), source)]]
+    names = [layout.names[i] for i in layout.kept]
+    return joined(
+        [
+            cloud_from_columns(
+                {name: table[:, i] for i, name in enumerate(names)},
+                source=source,
+                viewpoint=layout.viewpoint,
+                decimals=layout.decimals,
+                unit=unit,
+            )
+            for _, table in tables
+        ]
     )
 
 
-def _layout(head: bytes, source: str) -> Layout:
-    comment: list[str] = []
-    header: list[str] = []
-    brackets = False
-    lines = head.decode("utf-8", errors="replace").splitlines()
-    for number, line in enumerate(lines):
-        if not line.strip():
-            continue
-        if not content(line, comments=True):
-            comment = _words(line.strip().lstrip("#/ \t"))
-            continue
-        if _MAPLE.match(line.strip()) and not brackets:
-            brackets = True
-            continue
-        text = line.translate(_BRACKETS) if brackets else line
-        delimiter = next((mark for mark in ";," if mark in text), None)
-        tokens = tokens_of(text, delimiter)
-        width = len(tokens)
-        wrong = fault(text, width, delimiter, comments=True)
-        if wrong is None and width >= 3:
-            names = _names(header, comment, width)
-            decimals = [name for name, token in zip(names, tokens, strict=True) if _DECIMAL.search(token)]
-            return Layout(names, delimiter, number, brackets, decimals)
-        cut_off = number == len(lines) - 1 and not head.endswith(b"\n")
-        if header or brackets or wrong is None or cut_off:
-            reason = wrong[0] if wrong else f"{width} values where a point needs three"
-            raise FileFormatError(f"{source}: not a table of points: line {number + 1}: {reason}")
-        header = _words(line)
-    if header:
-        raise FileFormatError(
-            f"{source}: not a table of points: line 1: {' '.join(header)[:40]!r} and no numbers"
-        )
-    raise FileFormatError(f"{source}: holds no points")
+def _tables(
+    file: BinaryIO, layout: Layout, source: str, progress: Progress
+) -> list[tuple[int | None, NDArray[np.float64]]]:
+    """Read the rows, one table for each scan, with the number of points that the line above it promises."""
+    scans: list[tuple[int | None, list[NDArray[np.float64]]]] = [(layout.count, [])]
+    for block in _without_bad_end(line_blocks(file, 1, progress), layout, source):
+        skip = max(layout.skip + 1 - block.first, 0)
+        lines, first = block.lines[skip:], block.first + skip
+        begin = 0
+        if layout.count is not None:
+            for number, line in enumerate(lines):
+                count = count_of(line)
+                if count is not None:
+                    scans[-1][1].append(_parsed(lines[begin:number], first + begin, layout, source))
+                    scans.append((count, []))
+                    begin = number + 1
+        scans[-1][1].append(_parsed(lines[begin:], first + begin, layout, source))
+    return [(count, np.concatenate(blocks)) for count, blocks in scans]
 
 
-def _words(line: str) -> list[str]:
-    delimiter = next((mark for mark in ";," if mark in line), None)
-    return [word.strip().strip("\"'") for word in line.strip().split(delimiter)]
-
-
-def _names(header: list[str], comment: list[str], width: int) -> list[str]:
-    """Name the columns: by the header, by a comment that names x, y, z, or by their numbers."""
-    given = header if 3 <= len(header) <= width else []
-    if not given and len(comment) == width and {"x", "y", "z"} <= {word.lower() for word in comment}:
-        given = comment
-    names = given + [f"column_{i + 1}" for i in range(len(given), width)]
-    if not {"x", "y", "z"} <= {name.lower() for name in names}:
-        names[:3] = ["x", "y", "z"]
-    taken: set[str] = set()
-    for i, name in enumerate(names):
-        names[i] = f"column_{i + 1}" if not name or name.lower() in taken else name
-        taken.add(names[i].lower())
-    return names
-
-
-def _parse_block(block: Block, layout: Layout, source: str) -> NDArray[np.float64]:
-    skip = max(layout.skip + 1 - block.first, 0)
-    lines = block.lines[skip:]
+def _parsed(lines: list[str], first: int, layout: Layout, source: str) -> NDArray[np.float64]:
     if layout.brackets:
-        lines = [line.translate(_BRACKETS) for line in lines]
+        lines = [layout.plain(line) for line in lines]
     return parse(
         lines,
         np.float64,
-        len(layout.names),
+        layout.width,
         source=source,
-        first=block.first + skip,
+        first=first,
         delimiter=layout.delimiter,
         comments=True,
+        decimal_comma=layout.decimal_comma,
+        kept=layout.kept if len(layout.kept) < layout.width else None,
     )
+
+
+def _warn_of_counts(tables: list[tuple[int | None, NDArray[np.float64]]], source: str) -> None:
+    for number, (count, table) in enumerate(tables):
+        if count is not None and count != len(table):
+            which = f" of scan {number}" if len(tables) > 1 else ""
+            warnings.warn(
+                f"{source}: the count{which} promises {count} points, {len(table)} are there", stacklevel=3
+            )
+            return
 
 
 def _without_bad_end(blocks: Iterator[Block], layout: Layout, source: str) -> Iterator[Block]:
@@ -166,13 +138,18 @@ def _without_bad_end(blocks: Iterator[Block], layout: Layout, source: str) -> It
     if waiting is None:
         return
     if layout.brackets:
-        if not any("]" in line and not line.translate(_BRACKETS).strip() for line in waiting.lines[-3:]):
+        if not any("]" in line and not layout.plain(line).strip() for line in waiting.lines[-3:]):
             raise FileFormatError(f"{source}: cut off: its list of points has no closing bracket")
         yield waiting
         return
-    last = max((i for i, line in enumerate(waiting.lines) if content(line, comments=True)), default=None)
+    last = next(
+        (i for i in reversed(range(len(waiting.lines))) if content(waiting.lines[i], True, layout.delimiter)),
+        None,
+    )
     if last is not None:
-        wrong = fault(waiting.lines[last], len(layout.names), layout.delimiter, comments=True)
+        wrong = fault(
+            waiting.lines[last], layout.width, layout.delimiter, True, layout.decimal_comma, layout.kept
+        )
         unterminated = waiting.unterminated and last == len(waiting.lines) - 1
         if wrong is not None and (unterminated or wrong[1]):
             warn_dropped(source, waiting.first + last)

@@ -1,0 +1,107 @@
+"""The names of a text file's columns, as the lines above its rows give them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from surfsig.files.columns import unique_name
+from surfsig.files.coordinate_names import coordinates_of, is_unit
+from surfsig.files.first_columns import is_running
+from surfsig.files.lines import COMMENT_MARKS, cells_of, content
+from surfsig.files.number_words import has_decimal_comma, is_missing, is_number
+
+
+def names_above(
+    above: list[str], delimiter: str | None, rows: list[list[str]], source: str
+) -> list[str] | None:
+    """Find the names of the columns above the rows, in a line or in a comment.
+
+    A line that names coordinates counts before any other with a name per column, and the nearest to the
+    rows before those further up.
+
+    Parameters
+    ----------
+    above
+        The lines above the rows that are not empty.
+    delimiter
+        What stands between the rows' values; None is white space.
+    rows
+        Cells of some rows.
+    source
+        The file's name, for messages.
+
+    Returns
+    -------
+    list of str or None
+        A name for each of the first columns, or for all; None if no line can be that.
+
+    Raises
+    ------
+    FileFormatError
+        If several columns may be the same coordinate.
+    """
+    width = len(rows[0])
+    nameless: list[str] | None = None
+    for line in reversed(above):
+        comment = is_comment(line)
+        text = line.strip().lstrip("#/% \t!") if comment else content(line, False, delimiter)
+        for cells in _names_in(text, delimiter, comment):
+            if all(map(is_unit, cells)) and any(cells):
+                continue
+            if len(cells) == width - 1 and width > 3 and _are_row_names([row[0] for row in rows]):
+                # R gives no name to the column of the rows' names.
+                cells = ["row", *cells]
+            if not 3 <= len(cells) <= width or (comment and len(cells) != width):
+                continue
+            if coordinates_of(unique_names(cells), source) is not None:
+                return cells
+            if nameless is None and not comment and len(cells) == width:
+                nameless = cells
+    return nameless
+
+
+def _names_in(text: str, delimiter: str | None, comment: bool) -> Iterator[list[str]]:
+    """Cut a line into names, by the rows' own first; a comment may use another, or start with a word."""
+    marks = [delimiter]
+    if comment:
+        marks += [",", ";", "\t", None]
+    elif delimiter is None:
+        # Names of several words.
+        marks.append("\t")
+    for mark in marks:
+        yield [cell.strip("\"'") for cell in cells_of(text, mark)]
+    if comment:
+        for mark in ":=":
+            if mark in text:
+                yield text.partition(mark)[2].replace(",", " ").split()
+
+
+def _are_row_names(cells: list[str]) -> bool:
+    return are_words(cells) or is_running(cells)
+
+
+def unique_names(names: Sequence[str]) -> list[str]:
+    """Name what has no name, or one that is taken, by its place."""
+    unique: list[str] = []
+    taken: set[str] = set()
+    for i, name in enumerate(names):
+        known = not name or name.lower() in taken
+        unique.append(unique_name(f"column_{i + 1}", taken) if known else name)
+        taken.add(unique[-1].lower())
+    return unique
+
+
+def is_comment(line: str) -> bool:
+    """Tell whether a line is a comment."""
+    return line.lstrip().startswith(COMMENT_MARKS)
+
+
+def is_value(cell: str) -> bool:
+    """Tell whether a cell is a number, be it with a decimal comma."""
+    return is_number(cell) or has_decimal_comma(cell)
+
+
+def are_words(cells: list[str]) -> bool:
+    """Tell whether most of a column's values are no numbers; single ones are taken for damage."""
+    there = [cell for cell in cells if not is_missing(cell)]
+    return 2 * sum(1 for cell in there if not is_value(cell)) > len(there)
