@@ -17,7 +17,8 @@ BESIDE = ("_primitives.txt", "_parametric.txt", "_implicit.txt", "DERIVED.txt", 
 
 def clouds_in(folder: Path) -> list[Path]:
     kinds = {".ply", ".pcd", ".las", ".laz", ".e57", ".xyz", ".txt"}
-    files = sorted(path for path in folder.rglob("*") if path.suffix in kinds and path.name != "README.md")
+    texts = ("README.md", "README.txt")
+    files = sorted(path for path in folder.rglob("*") if path.suffix in kinds and path.name not in texts)
     return [path for path in files if not path.name.endswith(BESIDE)]
 
 

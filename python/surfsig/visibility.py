@@ -18,6 +18,10 @@ _HIDDEN = 0.1
 """Share of hidden points from which on nobody saw all from there: noise hides few (0.3 to 9 % on real scans
 from one viewpoint), a closed surface half, and an eighth at least of scans from several viewpoints."""
 
+_MOSTLY_HIDDEN = 0.25
+"""Share of hidden points from which on a default viewpoint is none: closed surfaces hide a quarter to a half,
+the side of one that is seen, evenly sampled to its rim, up to a fifth."""
+
 _FINEST = 1000.0
 """Lines of sight per median distance, at most: they must be few enough to be held."""
 
@@ -55,7 +59,7 @@ def hidden_from(direction: Array, places: Array, points: Array, spacing: float) 
     return np.asarray(front[asked] > places @ direction + _MARGIN * spacing)
 
 
-def seen_from(viewpoint: Array, points: Array, spacing: float) -> bool:
+def seen_from(viewpoint: Array, points: Array, spacing: float, most_hidden: float = _HIDDEN) -> bool:
     """Tell whether points (n, 3) can all have been seen from a viewpoint (3,).
 
     They cannot where many hide others, or from a thousand times as far away as they are wide. Nor does a
@@ -71,6 +75,8 @@ def seen_from(viewpoint: Array, points: Array, spacing: float) -> bool:
         Finite.
     spacing
         Between neighbouring points.
+    most_hidden
+        Share of the points that others may hide: noise and steep surfaces do so, too.
     """
     rays = points - viewpoint
     distances = np.linalg.norm(rays, axis=1)
@@ -79,7 +85,7 @@ def seen_from(viewpoint: Array, points: Array, spacing: float) -> bool:
     spread = float(np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1)))
     if float(np.median(distances)) > _FARTHEST * spread:
         return False
-    return not _hides_much(rays, distances, spacing) and not _is_closed(rays, distances)
+    return _hidden_share(rays, distances, spacing) < most_hidden and not _is_closed(rays, distances)
 
 
 def without_false_viewpoint(cloud: PointCloud, source: str) -> PointCloud:
@@ -101,7 +107,9 @@ def without_false_viewpoint(cloud: PointCloud, source: str) -> PointCloud:
         return cloud
     points = cloud.origin + cloud.offsets[:: max(1, len(cloud) // _SAMPLE)].astype(np.float64)
     points = np.unique(points[np.isfinite(points).all(axis=1) & points.any(axis=1)], axis=0)
-    if len(points) < 3 or seen_from(cloud.viewpoint, points, point_spacing(points)):
+    if len(points) < 3:
+        return cloud
+    if seen_from(cloud.viewpoint, points, point_spacing(points), _MOSTLY_HIDDEN):
         return cloud
     warnings.warn(
         f"{source}: its viewpoint is (0, 0, 0), the default of many programs, and no sensor can have seen "
@@ -111,7 +119,7 @@ def without_false_viewpoint(cloud: PointCloud, source: str) -> PointCloud:
     return replace(cloud, viewpoint=None)
 
 
-def _hides_much(rays: Array, distances: Array, spacing: float) -> bool:
+def _hidden_share(rays: Array, distances: Array, spacing: float) -> float:
     # Angles about an axis square to the mean ray, as lengths at the median distance: parallel lines of sight.
     forward = rays.mean(axis=0)
     pole = np.cross(forward, np.eye(3)[np.abs(forward).argmin()])
@@ -125,7 +133,7 @@ def _hides_much(rays: Array, distances: Array, spacing: float) -> bool:
     depth = middle * np.log(distances / middle)
     spacing = max(spacing, middle / _FINEST)
     sights = np.column_stack([middle * angles[0], middle * angles[1], -depth])
-    return float(hidden_from(np.array([0.0, 0.0, 1.0]), sights, sights, spacing).mean()) >= _HIDDEN
+    return float(hidden_from(np.array([0.0, 0.0, 1.0]), sights, sights, spacing).mean())
 
 
 def _is_closed(rays: Array, distances: Array) -> bool:

@@ -10,6 +10,7 @@ import click
 
 from surfsig.cli.console import number, on_terminal, print_json, print_table, progress_bar
 from surfsig.cli.options import CLOUD, input_options, json_option
+from surfsig.digits import position_text
 
 
 @click.command("info", no_args_is_help=True)
@@ -42,12 +43,15 @@ def info_command(file: Path, as_json: bool, **reading: Any) -> None:
 
 def _describe(cloud: Any) -> dict[str, Any]:
     from surfsig.cli.spacing import median_spacing
+    from surfsig.missing_returns import missing_returns
+    from surfsig.resolution import number_step
 
     finite = cloud.finite
     points = cloud.points if finite.all() else cloud.points[finite]
     return {
         "points": len(cloud),
         "finite_points": int(finite.sum()),
+        "missing_returns": int(missing_returns(cloud).sum()),
         "grid": cloud.grid,
         "coordinates": cloud.offsets.dtype.name,
         "minimum": points.min(axis=0) if len(points) else None,
@@ -55,6 +59,7 @@ def _describe(cloud: Any) -> dict[str, Any]:
         "viewpoint": cloud.viewpoint,
         "coordinate_system": _system(cloud.coordinate_system),
         "spacing": median_spacing(points),
+        "coordinate_step": number_step(cloud),
         "fields": {
             name: values.dtype.name + (f"[{values.shape[1]}]" if values.ndim == 2 else "")
             for name, values in cloud.fields.items()
@@ -82,7 +87,10 @@ def _warn_of_feet(file: Path, cloud: Any) -> None:
 def _rows(values: dict[str, Any]) -> list[tuple[str, str]]:
     rows = [("format", f"{values['format']}, coordinates {values['coordinates']}")]
     missing = values["points"] - values["finite_points"]
-    rows.append(("points", f"{values['points']:,}" + (f" ({missing:,} not finite)" if missing else "")))
+    apart = [f"{missing:,} not finite"] if missing else []
+    if values["missing_returns"]:
+        apart.append(f"{values['missing_returns']:,} at (0, 0, 0): a lidar's missing returns")
+    rows.append(("points", f"{values['points']:,}" + (f" ({'; '.join(apart)})" if apart else "")))
     if values["grid"]:
         rows.append(("organised", f"{values['grid'][0]} rows of {values['grid'][1]}"))
     if values["minimum"] is not None:
@@ -91,7 +99,7 @@ def _rows(values: dict[str, Any]) -> list[tuple[str, str]]:
         for axis, low, high in zip("xyz", values["minimum"], values["maximum"], strict=True):
             rows.append((axis, f"{low:.{digits}g} to {high:.{digits}g}"))
     seen_from = values["viewpoint"]
-    rows.append(("viewpoint", "not known" if seen_from is None else ", ".join(number(v) for v in seen_from)))
+    rows.append(("viewpoint", "not known" if seen_from is None else position_text(seen_from)))
     system = values["coordinate_system"]
     if system is None:
         rows.append(("coordinate system", "not known"))
@@ -104,6 +112,9 @@ def _rows(values: dict[str, Any]) -> list[tuple[str, str]]:
     if spacing is not None:
         advice = f"a radius of 5 to 10 times that ({5 * spacing:.2g} to {10 * spacing:.2g}) is a start"
         rows.append(("spacing", f"{number(spacing)} to the nearest point (median); {advice}"))
+        if values["coordinate_step"] > spacing:
+            step = number(values["coordinate_step"])
+            rows.append(("resolution", f"coordinates come in steps of {step}: too coarse for this spacing"))
     fields = ", ".join(f"{name} {kind}" for name, kind in values["fields"].items())
     rows.append(("fields", fields or "none"))
     return rows

@@ -10,18 +10,17 @@ import os
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surfsig.errors import FileFormatError, InvalidInputError
+from surfsig.errors import InvalidInputError
 from surfsig.files import formats
 from surfsig.files.atomic import check_target, replacing
 from surfsig.files.columns import Chunks, output_columns
-from surfsig.files.options import box_array, check_unit, column_names, cropped, in_metres, metres_per
 from surfsig.files.paths import Paths, files_meant
 from surfsig.files.progress import Progress, ProgressCallback
+from surfsig.files.read_file import ReadOptions, read_file
 from surfsig.files.sequence import ScanSequence, TimedScan, scan_sequence
 from surfsig.files.several import read_several
 from surfsig.files.trajectory import (
@@ -127,48 +126,11 @@ def read(
     differ in length also what follows the first that does); other files up to twice the cloud and more. A box
     or a unit makes a copy.
     """
+    options = ReadOptions(box, unit, columns, scan, samples, intrinsics, depth_scale)
     files = files_meant(path)
     if files is not None:
-        asked: dict[str, Any] = {
-            "box": box, "unit": unit, "columns": columns, "scan": scan, "samples": samples,
-            "intrinsics": intrinsics, "depth_scale": depth_scale,
-        }  # fmt: skip
-        return read_several(files, lambda file, told: read(file, **asked, progress=told), progress)
-    path = Path(path)  # type: ignore[arg-type]
-    corners = None if box is None else box_array(box)
-    metres = None if unit is None else metres_per(unit)
-    options = {
-        "columns": None if columns is None else column_names(columns),
-        "scan": scan,
-        "samples": samples,
-        "intrinsics": intrinsics,
-        "depth_scale": depth_scale,
-    }
-    given = {name: value for name, value in options.items() if value is not None}
-    with path.open("rb") as file:
-        size = os.fstat(file.fileno()).st_size
-        kind, reader = formats.of_content(path, file.read(formats.HEAD_BYTES), size)
-        for name in given:
-            if name not in kind.takes:
-                raise InvalidInputError(f"{path}: holds {kind.name} data, for which '{name}' means nothing")
-        if corners is not None and "box" in kind.takes:
-            given["box"] = corners
-        if unit is not None and "unit" in kind.takes:
-            given["unit"] = unit
-        file.seek(0)
-        try:
-            cloud = reader(file, str(path), Progress(progress, size), **given)
-        except MemoryError as error:
-            raise FileFormatError(f"{path}: {error or 'too large for the memory'}") from error
-        except InvalidInputError as error:
-            # With options the caller may be wrong, without any only the file can be.
-            if given:
-                raise
-            raise FileFormatError(f"{path}: {error}") from error
-    check_unit(cloud.coordinate_system, unit, str(path))
-    if corners is not None:
-        cloud = cropped(cloud, corners)
-    return cloud if metres is None else in_metres(cloud, metres)
+        return read_several(files, lambda file, told: read_file(file, options, told), progress)
+    return read_file(Path(path), options, progress)  # type: ignore[arg-type]
 
 
 def format_name(path: Paths) -> str:

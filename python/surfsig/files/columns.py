@@ -102,6 +102,12 @@ def cloud_from_columns(
     single = [name for name, values in columns.items() if values.ndim == 1]
     coordinates = coordinates_of(single, source, error)
     if coordinates is None:
+        wide = next(
+            (axis for axis in "xyz" if axis in by_lower_name and columns[by_lower_name[axis]].ndim > 1), ""
+        )
+        if wide:
+            count = columns[by_lower_name[wide]].shape[1]
+            raise error(f"{source}: column '{wide}' holds {count} numbers per point, not one")
         missing = next((axis for axis in "xyz" if axis not in by_lower_name), "x")
         raise error(
             f"{source}: no column '{missing}' among the point's values ({', '.join(columns) or 'none'})"
@@ -112,10 +118,6 @@ def cloud_from_columns(
     for axis in axes:
         if columns[axis].dtype.kind not in "fiu":
             raise error(f"{source}: column '{axis}' holds {columns[axis].dtype}, not real numbers")
-        if columns[axis].ndim != 1:
-            raise error(
-                f"{source}: column '{axis}' holds {columns[axis].shape[1]} numbers per point, not one"
-            )
     # Joining with float32 gives float32 to small types, and float64 to all that would lose digits.
     joint = np.result_type(np.float32, *(columns[axis].dtype for axis in axes))
     shared = _shared_rows(*(columns[axis] for axis in axes))

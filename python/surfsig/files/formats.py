@@ -118,6 +118,7 @@ class Format:
     check: Callable[[], None] = lambda: None
     reserved: tuple[str, ...] = ("x", "y", "z")
     takes: tuple[str, ...] = ()
+    has_default_viewpoint: bool = False
 
 
 def _begins(*marks: bytes) -> Callable[[Look], bool]:
@@ -192,7 +193,13 @@ _OF_TEXT = ("columns", "unit")
 FORMATS = (
     Format("PLY", (".ply",), _matches(ply_header.MAGIC), ply.read, ply.write, takes=("samples",)),
     Format(
-        "PCD", (".pcd",), _matches(pcd_header.MAGIC), pcd.read, pcd_write.write, reserved=pcd_write.RESERVED
+        "PCD",
+        (".pcd",),
+        _matches(pcd_header.MAGIC),
+        pcd.read,
+        pcd_write.write,
+        reserved=pcd_write.RESERVED,
+        has_default_viewpoint=True,
     ),
     Format("NPY", (".npy",), _begins(numpy_files.NPY_MAGIC), numpy_files.read_npy, takes=("columns",)),
     Format(
@@ -208,7 +215,15 @@ FORMATS = (
     ),
     Format("LAZ", (".laz",), _matches(_LAZ), "las:read", "las_write:write_laz", takes=("box",)),
     Format("LAS", (".las",), _begins(b"LASF"), "las:read", "las_write:write_las", takes=("box",)),
-    Format("E57", (".e57",), _begins(e57.MAGIC), e57.read, e57_writer.write, takes=("scan",)),
+    Format(
+        "E57",
+        (".e57",),
+        _begins(e57.MAGIC),
+        e57.read,
+        e57_writer.write,
+        takes=("scan",),
+        has_default_viewpoint=True,
+    ),
     Format(
         "PNG image",
         (".png",),

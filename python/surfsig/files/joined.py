@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.errors import InvalidInputError
 from surfsig.files.colours import ALPHA, CHANNELS
 from surfsig.point_cloud import PointCloud
 
@@ -40,6 +41,11 @@ def joined(
         For each, whether its colours were 16 bits in its file, and are uint8 as none is above 255: then they
         are not scaled.
 
+    Raises
+    ------
+    InvalidInputError
+        If they are in different coordinate systems.
+
     Warns
     -----
     UserWarning
@@ -47,6 +53,10 @@ def joined(
     """
     if len(clouds) == 1:
         return clouds[0]
+    systems = {cloud.coordinate_system for cloud in clouds} - {None}
+    if len(systems) > 1:
+        names = " and ".join(sorted(system.name or "one without a name" for system in systems if system))
+        raise InvalidInputError(f"{source}: the files are in different coordinate systems ({names})")
     in_16_bits = bytes_in_16_bits or [False] * len(clouds)
     fields = {
         FILE: np.repeat(np.arange(len(clouds), dtype=_number_type(len(clouds))), list(map(len, clouds)))
@@ -75,7 +85,14 @@ def joined(
             stacklevel=4,
         )
     origin, offsets = _placed(clouds)
-    return PointCloud(offsets, origin, viewpoint, fields, viewpoints=viewpoints)
+    return PointCloud(
+        offsets,
+        origin,
+        viewpoint,
+        fields,
+        viewpoints=viewpoints,
+        coordinate_system=next(iter(systems), None),
+    )
 
 
 def common_viewpoints(

@@ -10,6 +10,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.coordinate_system import CoordinateSystem
 from surfsig.errors import FileFormatError
 from surfsig.files import mesh
 from surfsig.files.columns import (
@@ -101,6 +102,7 @@ def read(file: BinaryIO, source: str, progress: Progress, samples: int | None = 
         grid=_grid(header.notes.get("grid", ""), vertex.count),
         declared_float32=not header.order and all(kind.endswith("f4") for kind in axes),
     )
+    cloud.coordinate_system = CoordinateSystem.from_text(header.notes.get("coordinate_system", ""))
     if samples is None or faces is None:
         return cloud
     mesh.check_vertices(cloud.offsets, source)
@@ -132,6 +134,8 @@ def write(
     told = dict(notes)
     if cloud.viewpoint is not None:
         told["viewpoint"] = " ".join(repr(float(value)) for value in cloud.viewpoint)
+    if cloud.coordinate_system is not None:
+        told["coordinate_system"] = cloud.coordinate_system.to_text()
     if cloud.grid is not None:
         told["grid"] = f"{cloud.grid[0]} {cloud.grid[1]}"
     header += [f"comment surfsig {key} {' '.join(value.split())}" for key, value in told.items()]

@@ -13,6 +13,7 @@ import numpy as np
 
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.paths import Paths, files_of_folder, matches, natural
+from surfsig.files.read_file import ReadOptions, read_file
 from surfsig.files.ros_bag import BagTopic, bag_of
 from surfsig.files.timestamps import times_of_names
 from surfsig.point_cloud import PointCloud
@@ -139,10 +140,8 @@ def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> 
 
 def scan_or_empty(path: Path, **reading: Any) -> PointCloud:
     """Read a scan; one that cannot be read gives a warning and no points, so that the others can be used."""
-    from surfsig.files import read
-
     try:
-        return read(path, **reading)
+        return read_file(path, ReadOptions(**reading), keep_default_viewpoint=True)
     except (FileFormatError, OSError) as error:
         told = str(error) if isinstance(error, FileFormatError) else f"{path}: {error.strerror or error}"
         warnings.warn(f"{told}; taken as a scan without points", stacklevel=2)
