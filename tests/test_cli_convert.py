@@ -115,3 +115,18 @@ def test_options_reach_the_reader(
         "intrinsics": [500, 510, 320, 240.5],
         "depth_scale": 5000,
     }
+
+
+def test_columns_are_named_and_csv_is_written(shell: Callable[..., Any], tmp_path: Path) -> None:
+    rows = np.random.default_rng(1).normal(size=(40, 7)).astype("<f4")
+    (tmp_path / "a.bin").write_bytes(rows.tobytes())
+    assert "columns=" in shell("convert", tmp_path / "a.bin", tmp_path / "a.csv").err
+    words = ("--columns", "x,y,z,_,_,speed,_")
+    assert shell("convert", tmp_path / "a.bin", tmp_path / "a.csv", *words).code == 0
+    assert (tmp_path / "a.csv").read_text().startswith("x,y,z,speed\n")
+    again = read(tmp_path / "a.csv")
+    np.testing.assert_array_equal(again.points.astype(np.float32), rows[:, :3])
+    np.testing.assert_array_equal(again.fields["speed"].astype(np.float32), rows[:, 5])
+    finished = shell("convert", tmp_path / "a.csv", tmp_path / "b.ply", "--columns", "x,y,z")
+    assert finished.code != 0
+    assert "has 4 columns, and 'columns' names 3" in finished.err

@@ -92,6 +92,13 @@ def test_a_unit_in_the_header_is_named(tmp_path: Path, header: str, unit: str) -
         read(path, unit="km")
 
 
+def test_a_unit_below_the_header_is_named(tmp_path: Path) -> None:
+    path = save(tmp_path, "a.csv", table("id,X,Y,Z\n,mm,mm,mm", "nxyz"))
+    with pytest.warns(UserWarning, match="are in mm by their names"):
+        assert list(read(path).fields) == ["id"]
+    np.testing.assert_allclose(quietly(path, unit="mm").points, np.array(POINTS) / 1000)
+
+
 def test_degrees_are_no_lengths(tmp_path: Path) -> None:
     path = save(tmp_path, "a.csv", table("id,Latitude,Longitude,Elevation", "nyxz"))
     with pytest.warns(UserWarning, match="'Longitude' and 'Latitude' in degrees, which are no lengths"):
@@ -206,6 +213,7 @@ def test_first_columns_that_are_no_coordinates(tmp_path: Path, content: str, mes
     ("content", "message"),
     [
         ("".join(f"{i} {i % 3} 2 {i}\n" for i in range(20)), "the first counts the rows"),
+        ("".join(f"{i * i} 40{i}.5 2.5 {i}.25\n" for i in range(20)), "the first holds whole numbers"),
         ("".join(f"5 7 {i} {i}.5 {i}.25 {i}.75\n" for i in range(20)), "two of them never change"),
         ("".join(f"{i * i} {i} 3 {i}.5 {i}.25 {i}.75\n" for i in range(20)), "they hold whole numbers"),
     ],

@@ -115,6 +115,7 @@ def test_decimal_commas_beside_words_and_missing_values(tmp_path: Path) -> None:
     ("content", "message"),
     [
         ("1,2,3 4,5,6\n7,8,9 1,2,3\n", "both commas .* and blanks stand between numbers"),
+        ("1,5, 2,5, 3,5\n4,5, 5,5, 6,5\n", "commas with and without a blank stand between numbers"),
         ("1,5 2.5 3,5\n1,5 2,5 3,5\n", "decimal comma .*'1,5'.* point .*'2.5'"),
         (
             "100,000 200,000 300,000\n400,000 500,500 600,000\n",

@@ -38,7 +38,7 @@ _EAST = frozenset({"easting", "eastings", "east", "rechtswert", "ostwert"})
 _NORTH = frozenset({"northing", "northings", "north", "hochwert", "nordwert"})
 _HEIGHT = frozenset(
     {
-        "elevation", "elev", "height", "altitude", "alt", "h", "up", "u", "level", "hoehe", "höhe",
+        "elevation", "elev", "ele", "height", "altitude", "alt", "h", "up", "u", "level", "hoehe", "höhe",
         "ellipsoidal height", "ellipsoid height", "orthometric height",
     }
 )  # fmt: skip
@@ -49,7 +49,7 @@ _PLACE_WORDS = frozenset(
     {
         "pos", "position", "coord", "coords", "coordinate", "coordinates", "point", "points", "pt", "p",
         "loc", "location", "place", "vertex", "cartesian", "xyz", "utm", "world", "global", "local", "map",
-        "geometry",
+        "geometry", "center", "centre", "centroid",
     }
 )  # fmt: skip
 _AXES = {"x": 0, "y": 1, "z": 2}
@@ -159,6 +159,12 @@ def warn_of_units(coordinates: Coordinates, source: str, asked: str | None = Non
             f"and {done}{hint}",
             stacklevel=3,
         )
+
+
+def with_unit(name: str, word: str) -> str:
+    """Put a unit of length from a line below the names behind a name that gives none."""
+    unit = word.strip().strip("[](){}<>").strip().lower()
+    return f"{name} [{unit}]" if unit in _UNITS and _without_unit(name)[1] is None else name
 
 
 def is_unit(word: str) -> bool:

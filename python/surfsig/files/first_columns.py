@@ -123,6 +123,8 @@ def _doubt(rows: list[list[str]]) -> str | None:
     constant = [len(set(column)) == 1 for column in columns]
     if len(rows) >= _FEWEST_CONSTANT and sum(constant[:3]) >= 2 and constant[3:].count(False) >= 3:
         return "two of them never change"
+    if _are_whole(columns[0]) and not any(map(_are_whole, columns[1:4])) and len(rows) > 1:
+        return "the first holds whole numbers and the next three do not"
     if len(columns) >= 6 and all(map(_are_whole, columns[:3])):
         # Normals beside coordinates in whole millimetres are fractions too.
         further = [_values(column) for column in columns[3:6]]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 
 from surfsig.files.columns import unique_name
-from surfsig.files.coordinate_names import coordinates_of, is_unit
+from surfsig.files.coordinate_names import coordinates_of, is_unit, with_unit
 from surfsig.files.first_columns import is_running
 from surfsig.files.lines import COMMENT_MARKS, cells_of, content
 from surfsig.files.number_words import has_decimal_comma, is_missing, is_number
@@ -42,19 +43,25 @@ def names_above(
     """
     width = len(rows[0])
     nameless: list[str] | None = None
+    units: list[str] = []
     for line in reversed(above):
         comment = is_comment(line)
         text = line.strip().lstrip("#/% \t!") if comment else content(line, False, delimiter)
         for cells in _names_in(text, delimiter, comment):
             if all(map(is_unit, cells)) and any(cells):
+                units = units or cells
                 continue
             if len(cells) == width - 1 and width > 3 and _are_row_names([row[0] for row in rows]):
                 # R gives no name to the column of the rows' names.
                 cells = ["row", *cells]
             if not 3 <= len(cells) <= width or (comment and len(cells) != width):
                 continue
-            if coordinates_of(unique_names(cells), source) is not None:
-                return cells
+            found = coordinates_of(unique_names(cells), source)
+            if found is not None:
+                return [
+                    with_unit(name, unit) if name in found.names else name
+                    for name, unit in itertools.zip_longest(cells, units[: len(cells)], fillvalue="")
+                ]
             if nameless is None and not comment and len(cells) == width:
                 nameless = cells
     return nameless

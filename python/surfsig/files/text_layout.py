@@ -38,6 +38,8 @@ _SEPARATOR_LINE = re.compile(r"sep=(.)\s*$", re.IGNORECASE)
 _MAPLE = re.compile(r"\w+\s*:=\s*\[\s*$")
 _BRACKETS = str.maketrans("[],;", "    ")
 _NUMBERS_BY_BLANKS = re.compile(r"[-+.\d][-+.\deE]*(?:\s+[-+.\d][-+.\deE]*)+")
+# Numbers with decimal commas, and commas with blanks between them: 1,5, 2,5, 3,5.
+_PAIRS = re.compile(r"\s*[-+]?\d+,\d+(?:,\s+[-+]?\d+,\d+){2,}\s*$")
 _COUNT = re.compile(r"\s*\d+\s*$")
 _FRACTIONAL = re.compile(r"[.,eE]")
 
@@ -97,6 +99,7 @@ class _Table:
     rows: list[list[str]]
     words: int
     fitting: float
+    lines: list[str]
 
 
 def layout_of(head: bytes, whole: bool, source: str, columns: Sequence[str] | None) -> Layout:
@@ -188,7 +191,7 @@ def _table(lines: Sequence[str], start: int, delimiter: str | None) -> _Table | 
             # A sentence with three numbers in it.
             return None
         fitting = sum(1 for row in same if _fits(row, kinds)) / (len(cut) - place)
-        return _Table(delimiter, numbers[place], same, words, fitting)
+        return _Table(delimiter, numbers[place], same, words, fitting, [lines[i] for i in numbers[place:]])
     return None
 
 
@@ -241,6 +244,11 @@ def _described(table: _Table, above: list[str], source: str, columns: Sequence[s
     kept = [i for i in range(width) if i not in words]
     numbers = [[row[i] for i in kept] for row in rows]
     comma = _decimal_comma(numbers, source)
+    if table.delimiter == "," and all(map(_PAIRS.match, table.lines)):
+        raise FileFormatError(
+            f"{source}: line {table.first + 1}: commas with and without a blank stand between numbers "
+            f"({table.lines[0].strip()[:40]!r}): write decimal points, if these are decimal commas"
+        )
     counts = [count for line in above if (count := count_of(line)) is not None]
     layout = Layout([], kept, table.delimiter, table.first, comma, count=counts[-1] if counts else None)
     _name_columns(layout, columns, header, words, rows, numbers, above, source)
