@@ -6,6 +6,9 @@ use rayon::prelude::*;
 /// Queries at which the distance to the k-th neighbour is looked up, to choose a first radius.
 const SAMPLES: usize = 24;
 
+/// How often as many points again are looked at for places where too many points were in one.
+const ROUNDS: usize = 8;
+
 /// The points around a query that a surface is fitted to.
 ///
 /// ```
@@ -69,8 +72,8 @@ pub(super) fn first_radius(cloud: &PointCloud<'_>, k: usize, monitor: &Monitor) 
     Radius::new((1.05 * found).max(1e-12 * largest.max(1e-6)).min(1e17))
 }
 
-/// Distances to the k-th nearest point, the smallest first, at a few of the points; and the largest coordinate.
-/// Where k points are in one place, the distance to the nearest other place.
+/// Distances to the k-th nearest point, the smallest first, at a few places; and the largest coordinate. Where k
+/// points are in one place, the distance to the nearest other place.
 pub(super) fn distances_to_nearest(
     cloud: &PointCloud<'_>,
     k: usize,
@@ -78,10 +81,8 @@ pub(super) fn distances_to_nearest(
 ) -> Result<(Vec<f64>, f64), Error> {
     let positions: Vec<[f64; 3]> = (0..cloud.len()).filter_map(|i| cloud.position(i)).collect();
     let largest = positions.iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
-    let step = positions.len().div_ceil(SAMPLES).max(1);
-    let mut distances = positions
+    let mut distances = different_places(&positions)
         .par_iter()
-        .step_by(step)
         .map(|centre| {
             monitor.check()?;
             let square = |p: &[f64; 3]| (0..3).map(|a| (p[a] - centre[a]).powi(2)).sum::<f64>();
@@ -95,4 +96,25 @@ pub(super) fn distances_to_nearest(
         .collect::<Result<Vec<f64>, Error>>()?;
     distances.sort_unstable_by(f64::total_cmp);
     Ok((distances, largest))
+}
+
+/// A few places, spread over the order of the points. Many points may be in one, as missing returns are at
+/// (0, 0, 0): it counts once.
+fn different_places(positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let mut places: Vec<[f64; 3]> = Vec::with_capacity(SAMPLES);
+    let mut step = positions.len().div_ceil(SAMPLES).max(1);
+    let mut offset = 0;
+    for _ in 0..ROUNDS {
+        for place in positions.iter().skip(offset).step_by(step) {
+            if places.len() < SAMPLES && !places.contains(place) {
+                places.push(*place);
+            }
+        }
+        if places.len() == SAMPLES || step == 1 {
+            break;
+        }
+        // Half way between those that were looked at.
+        (step, offset) = (step.div_ceil(2), step.div_ceil(2) / 2);
+    }
+    places
 }

@@ -1,0 +1,68 @@
+"""Clouds in units that cannot go together: the message names the ratio and the units."""
+
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from finding_scene import finding_scene, whole
+from register_scenes import terrain
+
+import surfsig
+from surfsig import PointCloud
+
+RATIOS = [
+    (1000.0, "millimetres and metres"),
+    (100.0, "centimetres and metres"),
+    (25.4, "millimetres and inches"),
+    (12.0, "inches and feet"),
+    (3.2808, "feet and metres"),
+]
+
+
+def scans() -> tuple[Any, Any]:
+    rng = np.random.default_rng(12)
+    return terrain(rng, 1500, -1.1, 0.9), terrain(rng, 1500, -0.9, 1.1)
+
+
+@pytest.mark.parametrize(("ratio", "units"), RATIOS)
+def test_registration_names_the_units(ratio: float, units: str) -> None:
+    source, target = scans()
+    with pytest.warns(UserWarning, match=f"source is .* times as large as target.*{units}"):
+        assert not surfsig.register(source * ratio, target).trusted
+
+
+def test_registration_names_them_the_other_way_round() -> None:
+    source, target = scans()
+    with pytest.warns(UserWarning, match="target is .* times as large as source.*millimetres and metres"):
+        assert not surfsig.register(source, target * 1000.0).trusted
+
+
+def test_scans_of_one_unit_are_not_said_to_differ() -> None:
+    source, target = scans()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        assert surfsig.register(source, target).trusted
+    assert surfsig.unit_mismatch(source, target) is None
+    assert surfsig.unit_mismatch(source, np.zeros((0, 3))) is None
+    assert surfsig.unit_mismatch(source, np.zeros((5, 3))) is None
+
+
+@pytest.mark.parametrize("ratio", [1000.0, 25.4])
+def test_finding_names_the_units(ratio: float) -> None:
+    scene, model = finding_scene("figure", 2, copies=1, others=1).cloud, whole("figure")
+    larger = PointCloud(model.points * ratio)
+    with pytest.warns(UserWarning, match="nothing was found, and the model 'model' has points .* apart"):
+        assert not len(surfsig.find(larger, scene))
+
+
+def test_comparing_places_names_the_units(shell: Callable[..., Any], tmp_path: Path) -> None:
+    points = scans()[0]
+    metres, millimetres = tmp_path / "m.ply", tmp_path / "mm.ply"
+    surfsig.write(metres, points)
+    surfsig.write(millimetres, points * 1000.0)
+    finished = shell("compare", metres, millimetres, "--at", "0,0,0", "--at", "0,0,0", "--radius", 0.2)
+    assert finished.code == 2
+    assert "1000 is that of millimetres and metres" in finished.err
