@@ -28,7 +28,8 @@ def test_copies_beyond_the_neighbors_change_nothing() -> None:
     """With 2 copies everywhere the 20 nearest are 10 places; a heap of 30,000 elsewhere is not among them."""
     surface = places(3000, 2)
     heap = np.zeros((30_000, 3))
-    for how in ({"neighbors": 20}, {"neighbors": 20, "radius": 0.1}, {"neighbors": 20, "robust": True}):
+    hybrid = {"neighbors": 20, "radius": 0.1}
+    for how in ({"neighbors": 20}, hybrid, {**hybrid, "robust": True}):
         alone = surfsig.extract(surface, **how)
         beside = surfsig.extract(np.concatenate([heap, surface]), **how)
         # The lattice of nearest points follows from the whole cloud, and rounding with it.
