@@ -45,15 +45,22 @@ class Block:
 
 def line_blocks(file: BinaryIO, first: int, progress: Progress) -> Iterator[Block]:
     """Read the rest of a file as blocks of whole lines; `first` is the number of its next line."""
-    rest = b""
+    # Pieces of a line whose end was not read yet: joined once, however many there are.
+    begun: list[bytes] = []
     while data := file.read(BLOCK_BYTES):
         progress.advance(len(data))
-        whole, end, tail = (rest + data).rpartition(b"\n")
-        rest = tail
-        if end:
-            lines = _split(whole + end)
-            yield Block(lines, first)
-            first += len(lines)
+        end = data.rfind(b"\n")
+        if end < 0:
+            # The last byte may be the first half of a line end of two.
+            end = data.rfind(b"\r", 0, -1)
+        if end < 0:
+            begun.append(data)
+            continue
+        lines = _split(b"".join([*begun, data[: end + 1]]))
+        begun = [data[end + 1 :]]
+        yield Block(lines, first)
+        first += len(lines)
+    rest = b"".join(begun)
     if rest:
         yield Block(_split(rest), first, unterminated=not rest.endswith(b"\r"))
 
