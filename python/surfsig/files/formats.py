@@ -34,7 +34,7 @@ from surfsig.files import (
     text_write,
 )
 from surfsig.files.columns import Chunks
-from surfsig.files.encodings import UTF16_MARKS, decoded_head
+from surfsig.files.encodings import WIDE_MARKS, decoded_head
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
@@ -132,8 +132,8 @@ def _matches(pattern: re.Pattern[bytes]) -> Callable[[Look], bool]:
 
 
 def _is_text(look: Look) -> bool:
-    # UTF-16 begins with its mark; any other text has no zero and hardly a control character.
-    if look.head.startswith(UTF16_MARKS):
+    # UTF-16 and UTF-32 begin with a mark; any other text has no zero and hardly a control character.
+    if look.head.startswith(WIDE_MARKS):
         return True
     controls = len(look.head) - len(look.head.translate(None, _CONTROLS))
     return 0 not in look.head and controls * 50 <= len(look.head)

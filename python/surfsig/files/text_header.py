@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from surfsig.files.columns import unique_name
 from surfsig.files.coordinate_names import coordinates_of, is_unit, with_unit
 from surfsig.files.first_columns import is_running
-from surfsig.files.lines import COMMENT_MARKS, cells_of, content
+from surfsig.files.lines import cells_of, content, is_comment
 from surfsig.files.number_words import has_decimal_comma, is_missing, is_number
 
 
@@ -96,11 +96,6 @@ def unique_names(names: Sequence[str]) -> list[str]:
         unique.append(unique_name(f"column_{i + 1}", taken) if known else name)
         taken.add(unique[-1].lower())
     return unique
-
-
-def is_comment(line: str) -> bool:
-    """Tell whether a line is a comment."""
-    return line.lstrip().startswith(COMMENT_MARKS)
 
 
 def is_value(cell: str) -> bool:

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
 from surfsig.files.coordinate_names import coordinates_of
+from surfsig.files.encodings import names_decoded
 from surfsig.files.first_columns import first_columns, names_of_counted
-from surfsig.files.lines import cells_of, content, fault, split_lines, tokens_of
+from surfsig.files.lines import cells_of, content, fault, is_comment, split_lines, tokens_of
 from surfsig.files.number_words import (
     has_decimal_comma,
     has_decimal_point,
@@ -23,7 +24,7 @@ from surfsig.files.number_words import (
     why_no_number,
 )
 from surfsig.files.options import LEFT_OUT, check_width
-from surfsig.files.text_header import are_words, is_comment, is_value, names_above, unique_names
+from surfsig.files.text_header import are_words, is_value, names_above, unique_names
 from surfsig.files.text_notes import viewpoint_of
 
 # Lines of words above the first row: titles, names, units. With more of them it is prose; where none of them
@@ -128,7 +129,7 @@ def layout_of(head: bytes, whole: bool, source: str, columns: Sequence[str] | No
     UserWarning
         If columns are left out, or the first three are a doubtful choice.
     """
-    lines = split_lines(head.decode("utf-8", errors="replace"))
+    lines = split_lines(names_decoded(head))
     if not whole and len(lines) > 1:
         lines.pop()
     start = _after_brackets(lines)
