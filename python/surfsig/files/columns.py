@@ -342,10 +342,13 @@ def _shared_rows(x: NDArray[Any], y: NDArray[Any], z: NDArray[Any]) -> NDArray[A
 
 
 def _with_normals(fields: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Call normals nx, ny, nz, also where they have PCL's names."""
-    if not PCL_NORMALS.keys() <= fields.keys() or set(PCL_NORMALS.values()) & fields.keys():
+    """Call normals nx, ny, nz, also where they have PCL's names, or CloudCompare's in text (Nx, Ny, Nz)."""
+    if set(PCL_NORMALS.values()) & fields.keys():
         return fields
-    return {PCL_NORMALS.get(name, name): values for name, values in fields.items()}
+    for names in (PCL_NORMALS, {name.capitalize(): name for name in PCL_NORMALS.values()}):
+        if names.keys() <= fields.keys():
+            return {names.get(name, name): values for name, values in fields.items()}
+    return fields
 
 
 def _narrowed(offsets: NDArray[Any]) -> NDArray[Any]:

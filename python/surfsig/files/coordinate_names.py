@@ -51,7 +51,7 @@ _PLACE_WORDS = frozenset(
     {
         "pos", "position", "coord", "coords", "coordinate", "coordinates", "point", "points", "pt", "p",
         "loc", "location", "place", "vertex", "cartesian", "xyz", "utm", "world", "global", "local", "map",
-        "geometry", "center", "centre", "centroid", "field", "pose", "m",
+        "geometry", "center", "centre", "centroid", "pose",
     }
 )  # fmt: skip
 _AXES = {"x": 0, "y": 1, "z": 2}
@@ -177,7 +177,8 @@ def is_unit(word: str) -> bool:
 
 def _without_unit(name: str) -> tuple[str, str | None]:
     """Cut a unit off a name in lower case; None if there is none, or one that is no length."""
-    plain = name.strip().strip("\"'").strip().lower()
+    # rostopic puts "field." before each name of a message.
+    plain = name.strip().strip("\"'").strip().lower().removeprefix("field.")
     bracketed = _BRACKETED.search(plain)
     if bracketed is not None and bracketed.start():
         unit = next(group for group in bracketed.groups() if group is not None).strip()
@@ -214,8 +215,10 @@ def _readings(name: str, plain: str) -> Iterable[tuple[int, str, int]]:
             yield _PLACES, " ".join(place), _AXES[axis_word[0]]
             break
     else:
-        if len(words) > 1 and set(words[:-1]) <= _PLACE_WORDS and words[-1] in _NUMBERS:
-            yield _PLACES, " ".join(words[:-1]) + " by number", _NUMBERS[words[-1]]
+        if len(words) > 1 and words[0] in _PLACE_WORDS and words[-1] in _NUMBERS:
+            # VeloView's Points_m_XYZ:0 has its unit between.
+            if set(words[1:-1]) - _UNITS.keys() <= _PLACE_WORDS:
+                yield _PLACES, " ".join(words[:-1]) + " by number", _NUMBERS[words[-1]]
         elif len(words) == 1:
             word = words[0]
             numbered = _NUMBERED_AXIS.fullmatch(word)

@@ -153,6 +153,8 @@ def layout_of(head: bytes, whole: bool, source: str, columns: Sequence[str] | No
     ]
     if len(above) > _MOST_HEADER_LINES and any(not is_comment(line) for _, line in above):
         raise FileFormatError(f"{source}: {_why_not_points(shown, start)}")
+    for number, line in above:
+        _refuse_broken_row(line, number, best, source)
     layout = _described(best, [line for _, line in above], source, columns)
     layout.brackets = brackets
     layout.viewpoint = viewpoint_of(line for _, line in above if is_comment(line))
@@ -217,6 +219,25 @@ def _are_numbers_of_columns(cells: list[str], rest: list[list[str]]) -> bool:
     return not cells[0] or all(has_decimal_point(cell) for row in rest for cell in row[:3])
 
 
+def _refuse_broken_row(line: str, number: int, table: _Table, source: str) -> None:
+    """Refuse a line above the rows that is one of them but for some damage, and no header."""
+    if is_comment(line):
+        return
+    cells = cells_of(content(line, True, table.delimiter), table.delimiter)
+    width = len(table.rows[0])
+    values = sum(1 for cell in cells if cell and is_value(cell))
+    fractions = any(has_decimal_point(cell) for cell in cells)
+    if 2 * values <= len(cells) or not fractions and len(cells) != width:
+        return
+    if coordinates_of(unique_names(cells), source) is not None or _are_numbers_of_columns(cells, table.rows):
+        return
+    kinds = _numeric(table.rows[0])
+    kept = [i for i, kind in enumerate(kinds) if kind]
+    wrong = fault(line, width, table.delimiter, True, kept=kept)
+    if wrong is not None and len(cells) > 1:
+        raise FileFormatError(f"{source}: line {number + 1}: {wrong[0]}")
+
+
 def _numeric(cells: list[str]) -> list[bool]:
     return [is_value(cell) or is_missing(cell) for cell in cells]
 
@@ -245,6 +266,8 @@ def _described(table: _Table, above: list[str], source: str, columns: Sequence[s
     kept = [i for i in range(width) if i not in words]
     numbers = [[row[i] for i in kept] for row in rows]
     comma = _decimal_comma(numbers, source)
+    if table.delimiter == "," and columns is None:
+        _refuse_cut_numbers(rows, header, table, source)
     if table.delimiter == "," and all(map(_PAIRS.match, table.lines)):
         raise FileFormatError(
             f"{source}: line {table.first + 1}: commas with and without a blank stand between numbers "
@@ -319,6 +342,24 @@ def _refuse_blanks_and_commas(cells: list[str], source: str, line: int) -> None:
                 f"{source}: line {line + 1}: both commas (or semicolons) and blanks stand between numbers "
                 f"({cell[:40]!r}): write one of them between the values, and decimal points"
             )
+
+
+def _refuse_cut_numbers(
+    rows: list[list[str]], header: list[str] | None, table: _Table, source: str
+) -> None:
+    """Refuse numbers that their own decimal commas cut, as in 1,25,-3,5,0,75 with x, y, z above it."""
+    width = len(rows[0])
+    if width < 6 or width % 2 or not all(cell.lstrip("+-").isdecimal() for row in rows for cell in row):
+        return
+    behind = [cell for row in rows for cell in row[1::2]]
+    # Only what stands behind a comma begins with 0, and only what stands before it has a sign.
+    digits = all(map(str.isdecimal, behind)) and any(cell.startswith("0") and cell != "0" for cell in behind)
+    few_names = header is not None and 2 * len(header) == width
+    if few_names or (header is None and digits):
+        raise FileFormatError(
+            f"{source}: line {table.first + 1}: commas stand between numbers and, as it seems, within them "
+            f"({table.lines[0].strip()[:40]!r}): write decimal points, or semicolons between the values"
+        )
 
 
 def _decimal_comma(rows: list[list[str]], source: str) -> bool:
