@@ -123,10 +123,13 @@ def _doubt(rows: list[list[str]]) -> str | None:
     constant = [len(set(column)) == 1 for column in columns]
     if len(rows) >= _FEWEST_CONSTANT and sum(constant[:3]) >= 2 and constant[3:].count(False) >= 3:
         return "two of them never change"
-    if len(columns) >= 5 and all(map(_are_whole, columns[:2])) and not any(map(_are_whole, columns[2:5])):
-        # FARO's rows and columns of a scan; a grid's heights may have slopes or normals beside them.
-        if any(np.abs(_values(column)).max(initial=0) > 1 for column in columns[3:5]):
-            return "the first two hold whole numbers and the next three do not"
+    # FARO's rows and columns of a scan; a grid's heights may have slopes or normals beside them.
+    if (
+        len(columns) >= 5
+        and [_are_whole(column) for column in columns[:5]] == [True, True, False, False, False]
+        and any(np.abs(_values(column)).max(initial=0) > 1 for column in columns[3:5])
+    ):
+        return "the first two hold whole numbers and the next three do not"
     if _are_whole(columns[0]) and not any(map(_are_whole, columns[1:4])) and len(rows) > 1:
         return "the first holds whole numbers and the next three do not"
     if len(columns) >= 6 and all(map(_are_whole, columns[:3])):

@@ -104,8 +104,8 @@ def _are_row_names(rows: list[list[str]], source: str) -> bool:
     ):
         return True
     raise FileFormatError(
-        f"{source}: its header names {len(rows[0]) - 1} columns, its rows hold {len(rows[0])} values, and the "
-        "first may be x or the number of a row: name each of them by columns="
+        f"{source}: its header names {len(rows[0]) - 1} columns, its rows hold {len(rows[0])} values, and "
+        "the first may be x or the number of a row: name each of them by columns="
     )
 
 

@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
 from surfsig.files.coordinate_names import coordinates_of
+from surfsig.files.decimal_commas import decimal_comma_of, refuse_blanks_and_commas, refuse_cut_numbers
 from surfsig.files.encodings import names_decoded
 from surfsig.files.first_columns import first_columns, names_of_counted
 from surfsig.files.lines import cells_of, content, fault, is_comment, split_lines, tokens_of
 from surfsig.files.number_words import (
-    has_decimal_comma,
     has_decimal_point,
     has_thousands,
     is_missing,
-    may_be_thousands,
     why_no_number,
 )
 from surfsig.files.options import LEFT_OUT, check_width
@@ -38,9 +37,6 @@ _SEPARATOR_LINE = re.compile(r"sep=(.)\s*$", re.IGNORECASE)
 # Maple writes a list of points as "Points:=[", then "[x, y, z], " per line, then "];".
 _MAPLE = re.compile(r"\w+\s*:=\s*\[\s*$")
 _BRACKETS = str.maketrans("[],;", "    ")
-_NUMBERS_BY_BLANKS = re.compile(r"[-+.\d][-+.\deE]*(?:\s+[-+.\d][-+.\deE]*)+")
-# Numbers with decimal commas, and commas with blanks between them: 1,5, 2,5, 3,5.
-_PAIRS = re.compile(r"\s*[-+]?\d+,\d+(?:,\s+[-+]?\d+,\d+){2,}\s*$")
 _COUNT = re.compile(r"\s*\d+\s*$")
 _FRACTIONAL = re.compile(r"[.,eE]")
 
@@ -227,7 +223,7 @@ def _refuse_broken_row(line: str, number: int, table: _Table, source: str) -> No
     width = len(table.rows[0])
     values = sum(1 for cell in cells if cell and is_value(cell))
     fractions = any(has_decimal_point(cell) for cell in cells)
-    if 2 * values <= len(cells) or not fractions and len(cells) != width:
+    if 2 * values <= len(cells) or (not fractions and len(cells) != width):
         return
     if coordinates_of(unique_names(cells), source) is not None or _are_numbers_of_columns(cells, table.rows):
         return
@@ -262,16 +258,18 @@ def _described(table: _Table, above: list[str], source: str, columns: Sequence[s
         rows = [row[:-1] for row in rows]
         header = None if header is None else header[:width]
     words = [i for i in range(width) if are_words([row[i] for row in rows])]
-    _refuse_blanks_and_commas([rows[0][i] for i in words], source, table.first)
+    refuse_blanks_and_commas([rows[0][i] for i in words], source, table.first)
     kept = [i for i in range(width) if i not in words]
     numbers = [[row[i] for i in kept] for row in rows]
-    comma = _decimal_comma(numbers, source)
-    if table.delimiter == "," and columns is None:
-        _refuse_cut_numbers(rows, header, table, source)
-    if table.delimiter == "," and all(map(_PAIRS.match, table.lines)):
-        raise FileFormatError(
-            f"{source}: line {table.first + 1}: commas with and without a blank stand between numbers "
-            f"({table.lines[0].strip()[:40]!r}): write decimal points, if these are decimal commas"
+    comma = decimal_comma_of(numbers, source)
+    if table.delimiter == ",":
+        refuse_cut_numbers(
+            rows,
+            table.lines,
+            table.first,
+            None if header is None else len(header),
+            columns is not None,
+            source,
         )
     counts = [count for line in above if (count := count_of(line)) is not None]
     layout = Layout([], kept, table.delimiter, table.first, comma, count=counts[-1] if counts else None)
@@ -332,53 +330,6 @@ def _refuse_words(places: Sequence[int], layout: Layout, rows: list[list[str]], 
     for i in places:
         cell = next(row[i] for row in rows if not is_value(row[i]) and not is_missing(row[i]))
         raise FileFormatError(f"{source}: column '{layout.names[i]}': {why_no_number(cell)}")
-
-
-def _refuse_blanks_and_commas(cells: list[str], source: str, line: int) -> None:
-    """Refuse rows such as 1,2,3 4,5,6, which may be read in several ways."""
-    for cell in cells:
-        if _NUMBERS_BY_BLANKS.fullmatch(cell):
-            raise FileFormatError(
-                f"{source}: line {line + 1}: both commas (or semicolons) and blanks stand between numbers "
-                f"({cell[:40]!r}): write one of them between the values, and decimal points"
-            )
-
-
-def _refuse_cut_numbers(
-    rows: list[list[str]], header: list[str] | None, table: _Table, source: str
-) -> None:
-    """Refuse numbers that their own decimal commas cut, as in 1,25,-3,5,0,75 with x, y, z above it."""
-    width = len(rows[0])
-    if width < 6 or width % 2 or not all(cell.lstrip("+-").isdecimal() for row in rows for cell in row):
-        return
-    behind = [cell for row in rows for cell in row[1::2]]
-    # Only what stands behind a comma begins with 0, and only what stands before it has a sign.
-    digits = all(map(str.isdecimal, behind)) and any(cell.startswith("0") and cell != "0" for cell in behind)
-    few_names = header is not None and 2 * len(header) == width
-    if few_names or (header is None and digits):
-        raise FileFormatError(
-            f"{source}: line {table.first + 1}: commas stand between numbers and, as it seems, within them "
-            f"({table.lines[0].strip()[:40]!r}): write decimal points, or semicolons between the values"
-        )
-
-
-def _decimal_comma(rows: list[list[str]], source: str) -> bool:
-    """Tell whether numbers are written with a decimal comma; refuse what may be something else."""
-    commas = [cell for row in rows for cell in row if has_decimal_comma(cell)]
-    if not commas:
-        return False
-    point = next((cell for row in rows for cell in row if has_decimal_point(cell)), None)
-    if point is not None:
-        raise FileFormatError(
-            f"{source}: has numbers with a decimal comma ({commas[0]!r}) and with a point ({point!r})"
-        )
-    if all(map(may_be_thousands, commas)):
-        whole, _, thousandths = commas[0].partition(",")
-        raise FileFormatError(
-            f"{source}: {commas[0]!r} may be {whole}{thousandths}, by thousands, or {whole}.{thousandths}, "
-            "with a decimal comma: write decimal points"
-        )
-    return True
 
 
 def _columns_hint(width: int) -> str:
