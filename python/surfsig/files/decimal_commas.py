@@ -43,7 +43,7 @@ def decimal_comma_of(rows: list[list[str]], source: str) -> bool:
 
 
 def refuse_cut_numbers(
-    rows: list[list[str]], lines: Sequence[str], first: int, names: int | None, told: bool, source: str
+    rows: list[list[str]], lines: Sequence[str], first: int, names: int, source: str
 ) -> None:
     """Refuse rows with commas between values that have decimal commas too, as in 1,25,-3,5,0,75.
 
@@ -56,9 +56,7 @@ def refuse_cut_numbers(
     first
         Lines above them.
     names
-        How many columns a header names; None without one.
-    told
-        The caller has named the columns.
+        How many columns a header or the caller names; 0 without them.
     source
         The file's name.
     """
@@ -71,12 +69,12 @@ def refuse_cut_numbers(
         )
     width = len(rows[0])
     whole = all(cell.lstrip("+-").isdecimal() for row in rows for cell in row)
-    if told or not whole or width < 6 or width % 2:
+    if not whole or width < 6 or width % 2:
         return
     behind = [cell for row in rows for cell in row[1::2]]
     # Only what stands behind a decimal comma begins with 0, and only what stands before it has a sign.
     digits = all(map(str.isdecimal, behind)) and any(cell.startswith("0") and cell != "0" for cell in behind)
-    if (names is None and digits) or (names is not None and 2 * names == width):
+    if 2 * names == width or (not names and digits):
         raise FileFormatError(
             f"{source}: {shown} stand between numbers and, as it seems, within them {line}: write decimal "
             "points, or semicolons between the values"

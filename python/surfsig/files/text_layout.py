@@ -263,14 +263,7 @@ def _described(table: _Table, above: list[str], source: str, columns: Sequence[s
     numbers = [[row[i] for i in kept] for row in rows]
     comma = decimal_comma_of(numbers, source)
     if table.delimiter == ",":
-        refuse_cut_numbers(
-            rows,
-            table.lines,
-            table.first,
-            None if header is None else len(header),
-            columns is not None,
-            source,
-        )
+        refuse_cut_numbers(rows, table.lines, table.first, names, source)
     counts = [count for line in above if (count := count_of(line)) is not None]
     layout = Layout([], kept, table.delimiter, table.first, comma, count=counts[-1] if counts else None)
     _name_columns(layout, columns, header, words, rows, numbers, above, source)
