@@ -207,3 +207,14 @@ def test_completion_completes() -> None:
         [sys.executable, "-m", "surfsig.cli"], env=environment, capture_output=True, text=True, check=False
     )
     assert "plain,extract" in finished.stdout
+
+
+def test_neighbors_of_points_that_are_not_finite(shell: Callable[..., Any], tmp_path: Path) -> None:
+    scan, output = tmp_path / "scan.xyz", tmp_path / "out.csv"
+    scan.write_text("nan nan nan\n" * 5)
+    finished = shell("extract", scan, "--neighbors", 12, "-o", output, "-q")
+    assert finished.code == 0
+    assert (
+        finished.err
+        == f"surfsig: warning: {output}: no point has a curvature; is the number of neighbors 12 right?\n"
+    )

@@ -118,3 +118,9 @@ def test_odd_file_float32_utm(shared_data: Path, shell: Callable[..., Any], tmp_
     assert finished.code == 0
     assert "surfsig: warning: coordinates come in steps of 0.5" in finished.err
     assert '"too_coarse": 8000' in finished.out
+
+
+def test_points_at_one_place_are_not_too_coarse_for_patches_of_0() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        surfsig.register(np.ones((50, 3)), np.ones((50, 3)))

@@ -248,3 +248,12 @@ def test_a_viewpoint_of_the_call_goes_before_that_of_the_cloud(points: Array) ->
     assert below.oriented
     np.testing.assert_allclose(below.k1, -above.k2, atol=1e-5)
     np.testing.assert_allclose(below.normals, -above.normals, atol=1e-5)
+
+
+@pytest.mark.parametrize("points", [np.full((4, 3), np.nan), np.full((4, 3), np.inf), np.empty((0, 3))])
+@pytest.mark.parametrize("size", [{"neighbors": 12}, {"radius": "auto"}])
+def test_each_place_has_a_radius_where_no_point_is_finite(points: Any, size: dict[str, Any]) -> None:
+    result = extract(points, **size)
+    assert isinstance(result.radius, np.ndarray)
+    assert result.radius.shape == (len(points),)
+    assert result.columns()["radius"].shape == (len(points),)

@@ -188,7 +188,7 @@ def test_a_broken_ptx(tmp_path: Path, content: str, message: str) -> None:
         (
             "pts_pdal1508_cc.pts",
             10,
-            ["Rf", "Gf", "Bf", "Intensity", "Illuminance (PCV)", "Volume density (r=0.01)", "Nx", "Ny", "Nz"],
+            ["Rf", "Gf", "Bf", "Intensity", "Illuminance (PCV)", "Volume density (r=0.01)", "nx", "ny", "nz"],
         ),
         ("pts_pyntcloud241.pts", 9, ["intensity", "red", "green", "blue"]),
         ("ptx_pdal3718.ptx", 10, ["intensity"]),

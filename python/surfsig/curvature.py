@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
 from surfsig.arguments import (
@@ -165,6 +165,11 @@ def extract_radii(
     return job.run(PointCloud.of(cloud), sizes, None)
 
 
+def _each_its_own(radius: float | str | None, count: int) -> float | NDArray[np.float32]:
+    """Give the radius of all balls, or NaN for each place where none has its own (no point is finite)."""
+    return radius if isinstance(radius, float) else np.full(count, np.nan, np.float32)
+
+
 @dataclass(frozen=True)
 class _Job:
     """How curvature is extracted, whatever the neighbourhoods are."""
@@ -212,7 +217,7 @@ class _Job:
             )
         return [
             Extraction(
-                radius=arrays.pop("radius", size),
+                radius=arrays.pop("radius", _each_its_own(size, len(points))),
                 **arrays,
                 axes=self.axes,
                 oriented=sensor is not None or directions is not None,

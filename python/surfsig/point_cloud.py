@@ -77,7 +77,9 @@ def coordinate_array(points: ArrayLike, name: str = "points") -> NDArray[Any]:
 def position_array(values: ArrayLike, name: str) -> NDArray[np.float64]:
     """Check one position, and return it as (3,) float64; an `InvalidInputError` says what `name` lacks."""
     try:
-        position = np.array(plain_array(values), dtype=np.float64)
+        array = plain_array(values)
+        # NumPy only warns of what it leaves out of complex numbers.
+        position = np.array(array, np.float64) if array.dtype.kind != "c" else np.empty(0)
     except (TypeError, ValueError):
         raise InvalidInputError(f"{name} must be three numbers") from None
     if position.shape != (3,) or not np.isfinite(position).all():

@@ -32,7 +32,8 @@ def warn_if_too_coarse(cloud: PointCloud, length: float, what: str, stacklevel: 
     stacklevel
         Of the warning.
     """
-    if number_step(cloud) > _surfsig.COARSEST_STEP * length:
+    # Points that are all at one place have no patches.
+    if length > 0 and number_step(cloud) > _surfsig.COARSEST_STEP * length:
         told = f"{step_text(cloud)}, too coarse for {what} of {length:.3g}"
         warnings.warn(told, stacklevel=stacklevel)
 

@@ -167,10 +167,11 @@ def extract_command(
     summary |= {"signatures": signatures, **_summary(result, status), "seconds": seconds}
     summary["points_per_second"] = len(result) / seconds["extract"] if seconds["extract"] else None
     if len(result) and not np.isfinite(result.k1).any():
-        asked = (
-            f"the radius {number(typical)}" if neighbors is None else f"the number of neighbors {neighbors}"
-        )
-        warnings.warn(f"{output}: no point has a curvature; is {asked} right?", stacklevel=1)
+        asked = f"the radius {number(typical)}"
+        if neighbors is not None:
+            asked = f"the number of neighbors {neighbors}"
+        why = " at any radius" if radius == "auto" else f"; is {asked} right?"
+        warnings.warn(f"{output}: no point has a curvature{why}", stacklevel=1)
     if as_json:
         print_json(summary)
     elif shown:

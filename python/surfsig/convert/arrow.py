@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -48,10 +49,16 @@ def cloud_of(
     except UnicodeDecodeError:
         raise error(f"{source}: a column's name is not in UTF-8") from None
     columns: dict[str, NDArray[Any]] = {}
+    words: list[str] = []
     for name, column in zip(names, table.columns, strict=True):
         values = _numbers(column)
         if values is not None:
             columns.setdefault(name, values)
+        else:
+            words.append(name)
+    if words:
+        told = ", ".join(f"'{name}'" for name in words)
+        warnings.warn(f"{source}: left out what holds no numbers: {told[:200]}", stacklevel=3)
     try:
         notes = json.loads((table.schema.metadata or {}).get(_NOTES, b"{}"))
         viewpoint, grid = notes.get("viewpoint"), notes.get("grid")
@@ -134,6 +141,9 @@ def _numbers(column: pa.ChunkedArray) -> NDArray[Any] | None:
     if types.is_fixed_size_list(kind) and not column.null_count:
         shape = (len(column), kind.list_size)
         array, kind = array.flatten(), kind.value_type
+    if types.is_decimal(kind):
+        # Databases' exact numbers, as DuckDB and Spark write them.
+        array, kind = array.cast(pyarrow().float64()), pyarrow().float64()
     if not (types.is_floating(kind) or types.is_integer(kind) or types.is_boolean(kind)):
         return None
     values: NDArray[Any] = np.asarray(array)

@@ -21,6 +21,11 @@ LOSS_ALLOWED = 1e-6
 # What PCL, and Open3D in PCD, call normals.
 PCL_NORMALS = {"normal_x": "nx", "normal_y": "ny", "normal_z": "nz"}
 
+# What (n, 3) coordinates are called; `points` is what surfsig writes.
+TRIPLES = frozenset(
+    {"points", "xyz", "pos", "position", "positions", "coord", "coords", "coordinates", "vertices"}
+)
+
 # What a `PointCloud` keeps as it is.
 _COORDINATES = (np.dtype("<f4"), np.dtype(">f4"), np.dtype("<f8"), np.dtype(">f8"))
 
@@ -61,8 +66,8 @@ def cloud_from_columns(
 ) -> PointCloud:
     """Make a cloud of named columns; those that are no coordinates are its fields.
 
-    Coordinates are x, y, z in any case, or `points` (n, 3), or what else `coordinate_names` knows (pos_x,
-    Easting, ...). Those that lie in memory as (n, 3) are not copied.
+    Coordinates are x, y, z in any case, or `points` (n, 3) and its like (xyz, pos, ...), or what else
+    `coordinate_names` knows (pos_x, Easting, ...). Those that lie in memory as (n, 3) are not copied.
 
     Parameters
     ----------
@@ -89,15 +94,16 @@ def cloud_from_columns(
         If the coordinates' names give another unit than metres and `unit`.
     """
     by_lower_name = {name.lower(): name for name in reversed(list(columns))}
-    points = columns.get(by_lower_name.get("points", ""))
-    if (
-        points is not None
-        and points.ndim == 2
-        and points.shape[1] == 3
-        and not by_lower_name.keys() & {*"xyz"}
-    ):
-        rest = {name: values for name, values in columns.items() if name != by_lower_name["points"]}
-        columns = {**dict(zip("xyz", points.T, strict=True)), **rest}
+    triples = [
+        name
+        for lower, name in by_lower_name.items()
+        if lower in TRIPLES and columns[name].ndim == 2 and columns[name].shape[1] == 3
+    ]
+    # The one that surfsig writes wins; of others nobody can say which is meant.
+    chosen = by_lower_name.get("points", "") if len(triples) > 1 else "".join(triples)
+    if chosen in triples and not by_lower_name.keys() & {*"xyz"}:
+        rest = {name: values for name, values in columns.items() if name != chosen}
+        columns = {**dict(zip("xyz", columns[chosen].T, strict=True)), **rest}
         by_lower_name |= {axis: axis for axis in "xyz"}
     single = [name for name, values in columns.items() if values.ndim == 1]
     coordinates = coordinates_of(single, source, error)
@@ -342,10 +348,13 @@ def _shared_rows(x: NDArray[Any], y: NDArray[Any], z: NDArray[Any]) -> NDArray[A
 
 
 def _with_normals(fields: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Call normals nx, ny, nz, also where they have PCL's names."""
-    if not PCL_NORMALS.keys() <= fields.keys() or set(PCL_NORMALS.values()) & fields.keys():
+    """Call normals nx, ny, nz, also where they have PCL's names, or CloudCompare's in text (Nx, Ny, Nz)."""
+    if set(PCL_NORMALS.values()) & fields.keys():
         return fields
-    return {PCL_NORMALS.get(name, name): values for name, values in fields.items()}
+    for names in (PCL_NORMALS, {name.capitalize(): name for name in PCL_NORMALS.values()}):
+        if names.keys() <= fields.keys():
+            return {names.get(name, name): values for name, values in fields.items()}
+    return fields
 
 
 def _narrowed(offsets: NDArray[Any]) -> NDArray[Any]:

@@ -32,7 +32,9 @@ _OTHER_UNITS = frozenset(
 _BRACKETED = re.compile(r"\s*(?:\[([^\]]*)\]|\(([^)]*)\)|\{([^}]*)\}|<([^>]*)>)\s*$")
 _BEHIND_SLASH = re.compile(r"\s*(?:/|\bin\b)\s*([a-z°][a-z° -]*)$")
 _BEHIND_BLANK = re.compile(r"[ _]([a-z]+)$")
-_SEPARATORS = re.compile(r"[\s_.:,\-]+")
+_SEPARATORS = re.compile(r"[\s_.:,/\-]+")
+# Ouster writes X1, Y1, Z1, and X2, Y2, Z2 for the second return.
+_NUMBERED_AXIS = re.compile(r"([xyz])(\d{1,2})")
 
 _EAST = frozenset({"easting", "eastings", "east", "rechtswert", "ostwert"})
 _NORTH = frozenset({"northing", "northings", "north", "hochwert", "nordwert"})
@@ -49,7 +51,7 @@ _PLACE_WORDS = frozenset(
     {
         "pos", "position", "coord", "coords", "coordinate", "coordinates", "point", "points", "pt", "p",
         "loc", "location", "place", "vertex", "cartesian", "xyz", "utm", "world", "global", "local", "map",
-        "geometry", "center", "centre", "centroid",
+        "geometry", "center", "centre", "centroid", "pose",
     }
 )  # fmt: skip
 _AXES = {"x": 0, "y": 1, "z": 2}
@@ -175,7 +177,8 @@ def is_unit(word: str) -> bool:
 
 def _without_unit(name: str) -> tuple[str, str | None]:
     """Cut a unit off a name in lower case; None if there is none, or one that is no length."""
-    plain = name.strip().strip("\"'").strip().lower()
+    # rostopic puts "field." before each name of a message.
+    plain = name.strip().strip("\"'").strip().lower().removeprefix("field.")
     bracketed = _BRACKETED.search(plain)
     if bracketed is not None and bracketed.start():
         unit = next(group for group in bracketed.groups() if group is not None).strip()
@@ -212,10 +215,15 @@ def _readings(name: str, plain: str) -> Iterable[tuple[int, str, int]]:
             yield _PLACES, " ".join(place), _AXES[axis_word[0]]
             break
     else:
-        if len(words) > 1 and words[0] in _PLACE_WORDS and words[1:] == words[-1:] and words[-1] in _NUMBERS:
-            yield _PLACES, words[0] + " by number", _NUMBERS[words[-1]]
+        if len(words) > 1 and words[0] in _PLACE_WORDS and words[-1] in _NUMBERS:
+            # VeloView's Points_m_XYZ:0 has its unit between.
+            if set(words[1:-1]) - _UNITS.keys() <= _PLACE_WORDS:
+                yield _PLACES, " ".join(words[:-1]) + " by number", _NUMBERS[words[-1]]
         elif len(words) == 1:
             word = words[0]
+            numbered = _NUMBERED_AXIS.fullmatch(word)
+            if numbered is not None:
+                yield _PLACES, "return " + numbered[2], _AXES[numbered[1]]
             if word[1:] in _PLACE_WORDS - {"p"} and word[0] in _AXES:
                 yield _PLACES, word[1:], _AXES[word[0]]
             elif word[:-1] in _PLACE_WORDS and word[-1] in _AXES:

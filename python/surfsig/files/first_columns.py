@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from surfsig.errors import FileFormatError
 from surfsig.files.number_words import is_missing
 
+# With fewer rows and more columns than this, nameless numbers are hardly points: the table is transposed.
+FEW_ROWS, MANY_COLUMNS = 6, 16
 # Seconds since 1970 are more; no coordinate in metres is, on the Earth.
 _SMALLEST_TIME = 1e9
 # By how much a file's times differ at most, as a share: the seconds since 1970 by twenty days.
@@ -42,7 +44,8 @@ def first_columns(rows: list[list[str]], places: Sequence[int], hint: str, sourc
     Raises
     ------
     FileFormatError
-        If the first column counts the rows or gives a time, or there are words before the coordinates.
+        If the first column counts the rows or gives a time, if there are words before the coordinates, or
+        many columns and hardly a row.
 
     Warns
     -----
@@ -57,6 +60,11 @@ def first_columns(rows: list[list[str]], places: Sequence[int], hint: str, sourc
         raise FileFormatError(
             f"{source}: not a table of points: the first three columns are not all numbers, and no header "
             f"names the coordinates; {hint} does"
+        )
+    if len(rows) < FEW_ROWS and len(places) > MANY_COLUMNS:
+        raise FileFormatError(
+            f"{source}: {len(rows)} rows of {len(places)} numbers without names are hardly points: is the "
+            "table transposed? a header, or columns=, says that it is not"
         )
     if len(places) > 3:
         reason = _plainly_none(rows)
@@ -123,6 +131,13 @@ def _doubt(rows: list[list[str]]) -> str | None:
     constant = [len(set(column)) == 1 for column in columns]
     if len(rows) >= _FEWEST_CONSTANT and sum(constant[:3]) >= 2 and constant[3:].count(False) >= 3:
         return "two of them never change"
+    # FARO's rows and columns of a scan; a grid's heights may have slopes or normals beside them.
+    if (
+        len(columns) >= 5
+        and [_are_whole(column) for column in columns[:5]] == [True, True, False, False, False]
+        and any(np.abs(_values(column)).max(initial=0) > 1 for column in columns[3:5])
+    ):
+        return "the first two hold whole numbers and the next three do not"
     if _are_whole(columns[0]) and not any(map(_are_whole, columns[1:4])) and len(rows) > 1:
         return "the first holds whole numbers and the next three do not"
     if len(columns) >= 6 and all(map(_are_whole, columns[:3])):

@@ -34,11 +34,13 @@ from surfsig.files import (
     text_write,
 )
 from surfsig.files.columns import Chunks
-from surfsig.files.encodings import UTF16_MARKS, decoded_head
+from surfsig.files.encodings import WIDE_MARKS, decoded_head
 from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
 
 HEAD_BYTES = 4096
+# What hardly occurs in a text: control characters that are no white space.
+_CONTROLS = bytes(byte for byte in range(32) if not 9 <= byte <= 13)
 
 
 # Reads from an open file with a name (for messages); the options that the format takes come by keyword.
@@ -130,10 +132,10 @@ def _matches(pattern: re.Pattern[bytes]) -> Callable[[Look], bool]:
 
 
 def _is_text(look: Look) -> bool:
-    # UTF-16 begins with its mark; any other text has no zero and hardly a control character.
-    if look.head.startswith(UTF16_MARKS):
+    # UTF-16 and UTF-32 begin with a mark; any other text has no zero and hardly a control character.
+    if look.head.startswith(WIDE_MARKS):
         return True
-    controls = sum(byte < 9 or 13 < byte < 32 for byte in look.head)
+    controls = len(look.head) - len(look.head.translate(None, _CONTROLS))
     return 0 not in look.head and controls * 50 <= len(look.head)
 
 

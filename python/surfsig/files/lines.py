@@ -13,13 +13,19 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from surfsig.errors import FileFormatError
-from surfsig.files.number_words import in_one_spelling, is_missing, is_number, why_no_number
+from surfsig.files.number_words import (
+    BEGINS_WITH_FORMULA,
+    in_one_spelling,
+    is_missing,
+    is_number,
+    why_no_number,
+)
 from surfsig.files.progress import Progress
 
 BLOCK_BYTES = 1 << 22
 COMMENT_MARKS = ("#", "//", "%")
-# Behind values: "1.#QNAN" is a number, and "#N/A" is what a spreadsheet writes where there is none.
-_COMMENT_BEHIND = re.compile(r"\s(?:#(?!N/A)|//)")
+# Behind values: "1.#QNAN" is a number.
+_COMMENT_BEHIND = re.compile(r"\s(?=#|//)")
 _QUOTED_WORDS = re.compile(r'"[^"]*"|[^\s"]+')
 _POINT = re.compile(r"\d\.|\.\d")
 
@@ -45,15 +51,22 @@ class Block:
 
 def line_blocks(file: BinaryIO, first: int, progress: Progress) -> Iterator[Block]:
     """Read the rest of a file as blocks of whole lines; `first` is the number of its next line."""
-    rest = b""
+    # Pieces of a line whose end was not read yet: joined once, however many there are.
+    begun: list[bytes] = []
     while data := file.read(BLOCK_BYTES):
         progress.advance(len(data))
-        whole, end, tail = (rest + data).rpartition(b"\n")
-        rest = tail
-        if end:
-            lines = _split(whole + end)
-            yield Block(lines, first)
-            first += len(lines)
+        end = data.rfind(b"\n")
+        if end < 0:
+            # The last byte may be the first half of a line end of two.
+            end = data.rfind(b"\r", 0, -1)
+        if end < 0:
+            begun.append(data)
+            continue
+        lines = _split(b"".join([*begun, data[: end + 1]]))
+        begun = [data[end + 1 :]]
+        yield Block(lines, first)
+        first += len(lines)
+    rest = b"".join(begun)
     if rest:
         yield Block(_split(rest), first, unterminated=not rest.endswith(b"\r"))
 
@@ -213,14 +226,21 @@ def content(line: str, comments: bool, delimiter: str | None = None) -> str:
     # A tab at either end may stand beside an empty value.
     text = line.strip(" \r\n") if delimiter == "\t" else line.strip()
     if comments and text:
-        if text.lstrip().startswith(COMMENT_MARKS):
+        if is_comment(text):
             return ""
         if "#" in text or "//" in text:
-            end = _COMMENT_BEHIND.search(text)
+            ends = _COMMENT_BEHIND.finditer(text)
+            end = next((found for found in ends if not BEGINS_WITH_FORMULA.match(text, found.end())), None)
             # Values behind it show that it is part of a word.
             if end is not None and (delimiter is None or delimiter not in text[end.start() :].strip()):
                 return text[: end.start()].rstrip(" ")
     return text
+
+
+def is_comment(line: str) -> bool:
+    """Tell whether a line is a comment; one that begins with a spreadsheet's #N/A is not."""
+    text = line.lstrip()
+    return text.startswith(COMMENT_MARKS) and BEGINS_WITH_FORMULA.match(text) is None
 
 
 def cells_of(text: str, delimiter: str | None) -> list[str]:

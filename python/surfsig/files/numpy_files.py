@@ -19,12 +19,14 @@ from numpy.typing import NDArray
 from surfsig.coordinate_system import CoordinateSystem
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.columns import (
+    TRIPLES,
     Chunks,
     aligned_blocks,
     blocks_of,
     cloud_from_columns,
     numeric_columns,
 )
+from surfsig.files.first_columns import FEW_ROWS, MANY_COLUMNS
 from surfsig.files.options import LEFT_OUT, check_width
 from surfsig.files.progress import Progress
 from surfsig.files.rows import filled
@@ -96,18 +98,15 @@ def read_npz(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
     if "points" not in arrays and len(arrays) == 1:
         arrays = {"points": next(iter(arrays.values()))}
     if "points" in arrays:
+        both = next((name for name in arrays if name.lower() in ("x", "y", "z")), None)
+        if both is not None:
+            raise FileFormatError(f"{source}: both 'points' and '{both}' may be the coordinates")
         main = _cloud_from_array(arrays.pop("points"), source)
         columns: dict[str, NDArray[Any]] = {axis: main.offsets[:, i] for i, axis in enumerate("xyz")}
         columns.update(main.fields)
-    elif {"x", "y", "z"} <= arrays.keys():
-        columns = {axis: arrays.pop(axis).ravel() for axis in "xyz"}
-        if len({len(values) for values in columns.values()}) > 1:
-            raise FileFormatError(f"{source}: x, y and z differ in length")
+        count = len(main)
     else:
-        raise FileFormatError(
-            f"{source}: no array 'points', and not x, y, z (it holds {', '.join(arrays) or 'none'})"
-        )
-    count = len(columns["x"])
+        columns, count = _main_arrays(arrays, source)
     for name, values in arrays.items():
         if values.dtype.kind in "fiub" and values.ndim in (1, 2) and len(values) == count:
             columns[name] = values
@@ -125,6 +124,23 @@ def read_npz(file: BinaryIO, source: str, progress: Progress) -> PointCloud:
         return cloud if notes["origin"] is None else replace(cloud, origin=notes["origin"])
     except (InvalidInputError, TypeError, ValueError) as error:
         raise FileFormatError(f"{source}: {error}") from None
+
+
+def _main_arrays(arrays: dict[str, NDArray[Any]], source: str) -> tuple[dict[str, NDArray[Any]], int]:
+    """Take the coordinates out of arrays of which none is called points; also how many points there are."""
+    axes = {name.lower(): name for name in reversed(list(arrays)) if name.lower() in ("x", "y", "z")}
+    if len(axes) == len("xyz"):
+        columns = {axis: arrays.pop(axes[axis]).ravel() for axis in "xyz"}
+        if len({len(values) for values in columns.values()}) > 1:
+            raise FileFormatError(f"{source}: x, y and z differ in length")
+        return columns, len(columns["x"])
+    triples = [name for name in arrays if name.lower() in TRIPLES and arrays[name].shape[1:] == (3,)]
+    if len(triples) != 1:
+        raise FileFormatError(
+            f"{source}: no array 'points', and not x, y, z (it holds {', '.join(arrays) or 'none'})"
+        )
+    points = arrays.pop(triples[0])
+    return {"points": points}, len(points)
 
 
 def write_npz(
@@ -234,6 +250,11 @@ def _cloud_from_array(array: NDArray[Any], source: str, columns: Sequence[str] |
         raise FileFormatError(f"{source}: points must be real numbers, not {array.dtype}")
     if array.ndim != 2 or array.shape[1] < 3:
         raise FileFormatError(f"{source}: points must have the shape (n, 3) or wider, not {array.shape}")
+    if columns is None and len(array) < FEW_ROWS and array.shape[1] > MANY_COLUMNS:
+        raise FileFormatError(
+            f"{source}: {len(array)} rows of {array.shape[1]} numbers without names are hardly points: is "
+            "the array transposed? points must have the shape (n, 3) or wider"
+        )
     names = columns or ["x", "y", "z", *(f"column_{i + 1}" for i in range(3, array.shape[1]))]
     check_width(names, array.shape[1], source)
     return cloud_from_columns(
@@ -244,5 +265,6 @@ def _cloud_from_array(array: NDArray[Any], source: str, columns: Sequence[str] |
 def _grid(values: NDArray[Any] | None) -> tuple[int, int] | None:
     if values is None:
         return None
-    height, width = (int(side) for side in values)
-    return height, width
+    if values.shape != (2,) or values.dtype.kind not in "iu":
+        raise InvalidInputError("grid must be two whole numbers, its rows and its columns")
+    return int(values[0]), int(values[1])

@@ -83,6 +83,9 @@ def files_meant(paths: Paths) -> list[Path] | None:
         If there is no path at all.
     """
     if isinstance(paths, (str, os.PathLike)):
+        if not os.fspath(paths):
+            # Python takes it for the folder in which the program runs.
+            raise InvalidInputError("the path is empty")
         return _expanded(Path(paths))
     files = [file for path in paths for file in _expanded(Path(path)) or [Path(path)]]
     if not files:

@@ -59,7 +59,11 @@ def read(
     file = decoded(file)
     start = file.tell()
     head = part = file.read(_HEAD_BYTES)
-    while head.count(b"\n") < _HEAD_LINES and len(part) == _HEAD_BYTES and len(head) < _MOST_HEAD_BYTES:
+    while (
+        head.count(b"\n") + head.count(b"\r") < _HEAD_LINES
+        and len(part) == _HEAD_BYTES
+        and len(head) < _MOST_HEAD_BYTES
+    ):
         head += (part := file.read(_HEAD_BYTES))
     layout = layout_of(head, len(part) < _HEAD_BYTES, source, columns)
     file.seek(start)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 
+from surfsig.errors import FileFormatError
 from surfsig.files.columns import unique_name
 from surfsig.files.coordinate_names import coordinates_of, is_unit, with_unit
 from surfsig.files.first_columns import is_running
-from surfsig.files.lines import COMMENT_MARKS, cells_of, content
+from surfsig.files.lines import cells_of, content, is_comment
 from surfsig.files.number_words import has_decimal_comma, is_missing, is_number
 
 
@@ -51,7 +52,7 @@ def names_above(
             if all(map(is_unit, cells)) and any(cells):
                 units = units or cells
                 continue
-            if len(cells) == width - 1 and width > 3 and _are_row_names([row[0] for row in rows]):
+            if len(cells) == width - 1 and width > 3 and _are_row_names(rows, source):
                 # R gives no name to the column of the rows' names.
                 cells = ["row", *cells]
             if not 3 <= len(cells) <= width or (comment and len(cells) != width):
@@ -83,8 +84,29 @@ def _names_in(text: str, delimiter: str | None, comment: bool) -> Iterator[list[
                 yield text.partition(mark)[2].replace(",", " ").split()
 
 
-def _are_row_names(cells: list[str]) -> bool:
-    return are_words(cells) or is_running(cells)
+def _are_row_names(rows: list[list[str]], source: str) -> bool:
+    """Tell whether the first column, for which a name is missing, holds names or numbers of rows.
+
+    Raises
+    ------
+    FileFormatError
+        If its whole numbers may be coordinates as well.
+    """
+    first = [row[0] for row in rows]
+    if are_words(first) or is_running(first):
+        return True
+    if not rows[0][-1] or not all(cell.isdecimal() for cell in first) or len(rows) < 2:
+        return False
+    # A table of which rows were chosen keeps their numbers.
+    if len(set(first)) == len(first) and not any(
+        all(cell.lstrip("+-").isdecimal() for cell in column)
+        for column in ([row[i] for row in rows] for i in (1, 2, 3))
+    ):
+        return True
+    raise FileFormatError(
+        f"{source}: its header names {len(rows[0]) - 1} columns, its rows hold {len(rows[0])} values, and "
+        "the first may be x or the number of a row: name each of them by columns="
+    )
 
 
 def unique_names(names: Sequence[str]) -> list[str]:
@@ -96,11 +118,6 @@ def unique_names(names: Sequence[str]) -> list[str]:
         unique.append(unique_name(f"column_{i + 1}", taken) if known else name)
         taken.add(unique[-1].lower())
     return unique
-
-
-def is_comment(line: str) -> bool:
-    """Tell whether a line is a comment."""
-    return line.lstrip().startswith(COMMENT_MARKS)
 
 
 def is_value(cell: str) -> bool:

@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
 from surfsig.files.coordinate_names import coordinates_of
+from surfsig.files.decimal_commas import decimal_comma_of, refuse_blanks_and_commas, refuse_cut_numbers
+from surfsig.files.encodings import names_decoded
 from surfsig.files.first_columns import first_columns, names_of_counted
-from surfsig.files.lines import cells_of, content, fault, split_lines, tokens_of
+from surfsig.files.lines import cells_of, content, fault, is_comment, split_lines, tokens_of
 from surfsig.files.number_words import (
-    has_decimal_comma,
     has_decimal_point,
     has_thousands,
     is_missing,
-    may_be_thousands,
     why_no_number,
 )
 from surfsig.files.options import LEFT_OUT, check_width
-from surfsig.files.text_header import are_words, is_comment, is_value, names_above, unique_names
+from surfsig.files.text_header import are_words, is_value, names_above, unique_names
 from surfsig.files.text_notes import viewpoint_of
 
 # Lines of words above the first row: titles, names, units. With more of them it is prose; where none of them
@@ -37,9 +37,6 @@ _SEPARATOR_LINE = re.compile(r"sep=(.)\s*$", re.IGNORECASE)
 # Maple writes a list of points as "Points:=[", then "[x, y, z], " per line, then "];".
 _MAPLE = re.compile(r"\w+\s*:=\s*\[\s*$")
 _BRACKETS = str.maketrans("[],;", "    ")
-_NUMBERS_BY_BLANKS = re.compile(r"[-+.\d][-+.\deE]*(?:\s+[-+.\d][-+.\deE]*)+")
-# Numbers with decimal commas, and commas with blanks between them: 1,5, 2,5, 3,5.
-_PAIRS = re.compile(r"\s*[-+]?\d+,\d+(?:,\s+[-+]?\d+,\d+){2,}\s*$")
 _COUNT = re.compile(r"\s*\d+\s*$")
 _FRACTIONAL = re.compile(r"[.,eE]")
 
@@ -128,7 +125,7 @@ def layout_of(head: bytes, whole: bool, source: str, columns: Sequence[str] | No
     UserWarning
         If columns are left out, or the first three are a doubtful choice.
     """
-    lines = split_lines(head.decode("utf-8", errors="replace"))
+    lines = split_lines(names_decoded(head))
     if not whole and len(lines) > 1:
         lines.pop()
     start = _after_brackets(lines)
@@ -152,6 +149,8 @@ def layout_of(head: bytes, whole: bool, source: str, columns: Sequence[str] | No
     ]
     if len(above) > _MOST_HEADER_LINES and any(not is_comment(line) for _, line in above):
         raise FileFormatError(f"{source}: {_why_not_points(shown, start)}")
+    for number, line in above:
+        _refuse_broken_row(line, number, best, source)
     layout = _described(best, [line for _, line in above], source, columns)
     layout.brackets = brackets
     layout.viewpoint = viewpoint_of(line for _, line in above if is_comment(line))
@@ -216,6 +215,25 @@ def _are_numbers_of_columns(cells: list[str], rest: list[list[str]]) -> bool:
     return not cells[0] or all(has_decimal_point(cell) for row in rest for cell in row[:3])
 
 
+def _refuse_broken_row(line: str, number: int, table: _Table, source: str) -> None:
+    """Refuse a line above the rows that is one of them but for some damage, and no header."""
+    if is_comment(line):
+        return
+    cells = cells_of(content(line, True, table.delimiter), table.delimiter)
+    width = len(table.rows[0])
+    values = sum(1 for cell in cells if cell and is_value(cell))
+    fractions = any(has_decimal_point(cell) for cell in cells)
+    if 2 * values <= len(cells) or (not fractions and len(cells) != width):
+        return
+    if coordinates_of(unique_names(cells), source) is not None or _are_numbers_of_columns(cells, table.rows):
+        return
+    kinds = _numeric(table.rows[0])
+    kept = [i for i, kind in enumerate(kinds) if kind]
+    wrong = fault(line, width, table.delimiter, True, kept=kept)
+    if wrong is not None and len(cells) > 1:
+        raise FileFormatError(f"{source}: line {number + 1}: {wrong[0]}")
+
+
 def _numeric(cells: list[str]) -> list[bool]:
     return [is_value(cell) or is_missing(cell) for cell in cells]
 
@@ -240,15 +258,12 @@ def _described(table: _Table, above: list[str], source: str, columns: Sequence[s
         rows = [row[:-1] for row in rows]
         header = None if header is None else header[:width]
     words = [i for i in range(width) if are_words([row[i] for row in rows])]
-    _refuse_blanks_and_commas([rows[0][i] for i in words], source, table.first)
+    refuse_blanks_and_commas([rows[0][i] for i in words], source, table.first)
     kept = [i for i in range(width) if i not in words]
     numbers = [[row[i] for i in kept] for row in rows]
-    comma = _decimal_comma(numbers, source)
-    if table.delimiter == "," and all(map(_PAIRS.match, table.lines)):
-        raise FileFormatError(
-            f"{source}: line {table.first + 1}: commas with and without a blank stand between numbers "
-            f"({table.lines[0].strip()[:40]!r}): write decimal points, if these are decimal commas"
-        )
+    comma = decimal_comma_of(numbers, source)
+    if table.delimiter == ",":
+        refuse_cut_numbers(rows, table.lines, table.first, names, source)
     counts = [count for line in above if (count := count_of(line)) is not None]
     layout = Layout([], kept, table.delimiter, table.first, comma, count=counts[-1] if counts else None)
     _name_columns(layout, columns, header, words, rows, numbers, above, source)
@@ -308,35 +323,6 @@ def _refuse_words(places: Sequence[int], layout: Layout, rows: list[list[str]], 
     for i in places:
         cell = next(row[i] for row in rows if not is_value(row[i]) and not is_missing(row[i]))
         raise FileFormatError(f"{source}: column '{layout.names[i]}': {why_no_number(cell)}")
-
-
-def _refuse_blanks_and_commas(cells: list[str], source: str, line: int) -> None:
-    """Refuse rows such as 1,2,3 4,5,6, which may be read in several ways."""
-    for cell in cells:
-        if _NUMBERS_BY_BLANKS.fullmatch(cell):
-            raise FileFormatError(
-                f"{source}: line {line + 1}: both commas (or semicolons) and blanks stand between numbers "
-                f"({cell[:40]!r}): write one of them between the values, and decimal points"
-            )
-
-
-def _decimal_comma(rows: list[list[str]], source: str) -> bool:
-    """Tell whether numbers are written with a decimal comma; refuse what may be something else."""
-    commas = [cell for row in rows for cell in row if has_decimal_comma(cell)]
-    if not commas:
-        return False
-    point = next((cell for row in rows for cell in row if has_decimal_point(cell)), None)
-    if point is not None:
-        raise FileFormatError(
-            f"{source}: has numbers with a decimal comma ({commas[0]!r}) and with a point ({point!r})"
-        )
-    if all(map(may_be_thousands, commas)):
-        whole, _, thousandths = commas[0].partition(",")
-        raise FileFormatError(
-            f"{source}: {commas[0]!r} may be {whole}{thousandths}, by thousands, or {whole}.{thousandths}, "
-            "with a decimal comma: write decimal points"
-        )
-    return True
 
 
 def _columns_hint(width: int) -> str:
