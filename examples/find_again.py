@@ -11,6 +11,7 @@ import json
 import subprocess
 import sys
 import tempfile
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -55,7 +56,10 @@ def main(folder: Path, picture: Path) -> None:
         run("find", objects / "chef.pcd", objects / "scene.pcd", "--json", found, "-o", labelled)
         instances = json.loads(found.read_text())["instances"]
         scene = surfsig.read(labelled)
-    model = surfsig.read(objects / "chef.pcd").points
+    with warnings.catch_warnings():
+        # A model of a whole object has no viewpoint; its file says the default one.
+        warnings.filterwarnings("ignore", ".*its viewpoint is")
+        model = surfsig.read(objects / "chef.pcd").points
     draw(axes[2], [(scene.points, GREY)], "find: a scene")
     own = scene.fields["instance"] >= 0
     parts = [(scene.points[~own], GREY), (scene.points[own], ORANGE)]

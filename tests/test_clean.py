@@ -239,7 +239,7 @@ def test_clean_on_the_command_line(shell: Callable[..., Any], tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ((), "nothing to do: give --box, --outliers or --voxel"),
+        ((), "nothing to do: give --box, --no-returns, --outliers or --voxel"),
         (("--box", "1,2,3"), "'1,2,3' is not six numbers"),
         (("--box", "1,1,1,0,0,0"), "box must be two corners"),
         (("--voxel", "0"), "voxel must be a finite number above 0"),

@@ -170,6 +170,11 @@ def _each_its_own(radius: float | str | None, count: int) -> float | NDArray[np.
     return radius if isinstance(radius, float) else np.full(count, np.nan, np.float32)
 
 
+_FEW_TOO_COARSE = 0.01
+"""Share of places up to which nothing is said of coarse coordinates beside their status: lines of a scanner,
+as far apart as a fifth of the radius, are steps of those few faces that they run along."""
+
+
 @dataclass(frozen=True)
 class _Job:
     """How curvature is extracted, whatever the neighbourhoods are."""
@@ -209,7 +214,7 @@ class _Job:
         sizes = radius if isinstance(radius, Sequence) and not isinstance(radius, str) else [radius]
         counts = [int((arrays["status"] == Status.TOO_COARSE).sum()) for arrays in found]
         too_coarse = max(counts, default=0)
-        if too_coarse:
+        if too_coarse > _FEW_TOO_COARSE * len(points):
             warnings.warn(
                 f"{step_text(cloud)}, too coarse for the radius: {too_coarse} of "
                 f"{len(points)} places have no curvature (status too_coarse)",
