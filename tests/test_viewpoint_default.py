@@ -114,7 +114,7 @@ def test_models_that_hide_little_of_themselves(tmp_path: Path, shape: str) -> No
         points = rng.uniform(0, 1, (9000, 3))
         points[np.arange(9000), rng.integers(0, 3, 9000)] = rng.choice([0.0, 1.0], 9000)
     else:
-        points = ball(9000) + [0, 0, 0.5]
+        points = ball(9000) + np.array([0, 0, 0.5])
     with pytest.warns(UserWarning, match="viewpoint"):
         assert read_pcd(tmp_path / "model.pcd", points).viewpoint is None
 

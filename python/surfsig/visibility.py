@@ -185,9 +185,8 @@ def _are_in_rows(rays: Array, distances: Array) -> bool:
         far = np.maximum.reduceat(distances[order], starts)
         uneven = far - np.minimum.reduceat(distances[order], starts) > _EVEN * far
         rows = lengths >= _ROW_POINTS
-        if (
-            lengths[rows].sum() >= _IN_ROWS * len(rays)
-            and lengths[rows & uneven].sum() >= _UNEVEN_ROWS * len(rays)
+        if lengths[rows].sum() >= _IN_ROWS * len(rays) and lengths[rows & uneven].sum() >= _UNEVEN_ROWS * len(
+            rays
         ):
             return True
     return False
