@@ -66,6 +66,9 @@ _STEPS = 0.002
 """Share of depth steps between neighbouring directions that every real scan has; a closed surface seen from
 within has none, a lidar scan of a room or a street 0.007 to 0.06."""
 
+_DENSE = 500
+"""Directions from which on neighbouring ones are near enough for depth steps to mean something."""
+
 _SAMPLE = 4096
 """Points that tell whether a file's viewpoint can be true."""
 
@@ -153,6 +156,8 @@ def _measured_from_origin(points: Array) -> bool:
         return True
     if hidden >= _MOSTLY_HIDDEN or _is_closed(points, distances):
         return False
+    if len(points) < _DENSE:
+        return True
     broken = hidden + _step_share(points, distances)
     return broken < (_BROKEN_AROUND if _are_around(points, distances) else _BROKEN_BESIDE)
 
