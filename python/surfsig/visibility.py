@@ -67,7 +67,7 @@ _STEPS = 0.002
 within has none, a lidar scan of a room or a street 0.007 to 0.06."""
 
 _DENSE = 500
-"""Directions from which on neighbouring ones are near enough for depth steps to mean something."""
+"""Points from which on neighbours are near enough for their depths and distances to mean something."""
 
 _SAMPLE = 4096
 """Points that tell whether a file's viewpoint can be true."""
@@ -169,7 +169,7 @@ def _is_far(rays: Array, distances: Array) -> bool:
 
 def _is_on_surface(rays: Array, distances: Array) -> bool:
     """Tell whether the viewpoint is as near to points as these are to each other."""
-    if len(rays) < _NEAREST * _NEAREST:
+    if len(rays) < _DENSE:
         return False
     nearest = np.argpartition(distances, _NEAREST)[:_NEAREST]
     apart = cKDTree(rays).query(rays[nearest], k=2)[0][:, 1]
