@@ -340,3 +340,14 @@ def test_every_cut_is_noticed(tmp_path: Path) -> None:
     for size in (8, 47, 48, 1023, 1024, len(whole) - 1024, len(whole) - 1):
         with pytest.raises(FileFormatError, match="E57"):
             read(saved(tmp_path, whole[:size]))
+
+
+def test_scans_with_colours_of_8_and_16_bits(tmp_path: Path) -> None:
+    colours = np.array([1, 2, 3, 255, 300, 65535])
+    fields = {"scan": np.repeat([0, 1], 3), **dict.fromkeys(("red", "green", "blue"), colours)}
+    cloud = PointCloud(np.arange(18.0).reshape(6, 3), viewpoints=np.eye(2, 3), fields=fields)
+    path = tmp_path / "a.e57"
+    write(path, cloud)
+    with pytest.warns(UserWarning, match="may be on different scales"):
+        back = read(path)
+    np.testing.assert_array_equal(back.fields["red"], colours)

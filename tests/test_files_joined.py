@@ -282,3 +282,19 @@ def test_the_command_line_takes_patterns_and_folders(shell: Callable[..., Any], 
     assert shell("clean", folder, output, "--voxel", "100", "-q").code == 0
     assert shell("extract", folder, "--radius", "2", "-o", output, "-q").code == 0
     assert len(read(output)) == 18
+
+
+def test_a_file_without_points_takes_no_fields_away(tmp_path: Path) -> None:
+    write(tmp_path / "a.ply", PointCloud(np.eye(3), fields={"ring": np.arange(3)}))
+    write(tmp_path / "b.ply", PointCloud(np.zeros((0, 3))))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cloud = read([tmp_path / "b.ply", tmp_path / "a.ply"])
+    np.testing.assert_array_equal(cloud.fields["ring"], [0, 1, 2])
+    np.testing.assert_array_equal(cloud.fields["file"], [1, 1, 1])
+
+
+def test_an_empty_path_is_not_the_current_folder() -> None:
+    for paths in ("", [""]):
+        with pytest.raises(FileNotFoundError):
+            read(paths)

@@ -421,3 +421,18 @@ def test_legacy_point_formats_in_las_14(tmp_path: Path, kind: int, compressed: b
     assert_whole(cloud)
     assert {"synthetic", "withheld"} <= cloud.fields.keys()
     assert ("wavepacket_index" in cloud.fields) == (kind in (4, 5))
+
+
+def test_fewer_points_than_the_returns_of_a_laz_file_say(tmp_path: Path) -> None:
+    content = patched(las(3, "1.2", compressed=True), (107, "I", COUNT - 2))
+    with pytest.warns(UserWarning, match=f"promises {COUNT - 2} points, and {COUNT} by their returns"):
+        cloud = cloud_of(tmp_path, content)
+    np.testing.assert_allclose(cloud.points, points()[: COUNT - 2], atol=5e-4)
+
+
+def test_an_offset_beside_which_the_steps_are_lost(tmp_path: Path) -> None:
+    refused(tmp_path, patched(las(), (155, "d", 1e20)), r"the offset of x in its header is 1e\+20")
+
+
+def test_a_point_format_that_does_not_exist(tmp_path: Path) -> None:
+    refused(tmp_path, patched(las(), (104, "B", 35)), "names point format 35, of which LAS has none")

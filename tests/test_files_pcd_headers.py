@@ -326,3 +326,23 @@ def test_an_origin_without_doubles_is_added(tmp_path: Path) -> None:
         np.testing.assert_array_equal(cloud.points, points() + np.array([1e6, 2e6, 3]))
         assert cloud.viewpoint is not None
         assert cloud.viewpoint.tolist() == place
+
+
+def test_pypcd_stores_what_lzf_does_not_make_smaller(tmp_path: Path) -> None:
+    planes = np.random.default_rng(5).normal(size=(3, COUNT)).astype(np.float32)
+    data = planes.tobytes()
+    path = tmp_path / "a.pcd"
+    path.write_bytes(
+        header("binary_compressed", VIEWPOINT=None) + np.array([len(data)] * 2, "<u4").tobytes() + data
+    )
+    np.testing.assert_array_equal(read(path).points, planes.T)
+
+
+@pytest.mark.parametrize("byte_order", ["utf-16-le", "utf-16-be"])
+def test_a_header_in_utf_16_is_named(tmp_path: Path, byte_order: str) -> None:
+    ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n"
+    for name, text in (("PCD", (header("ascii") + rows()).decode()), ("PLY", ply)):
+        path = tmp_path / f"a.{name.lower()}"
+        path.write_bytes(("\ufeff" + text).encode(byte_order))
+        with pytest.raises(FileFormatError, match=f"is a {name} file in UTF-16"):
+            read(path)

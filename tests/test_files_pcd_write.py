@@ -1,5 +1,6 @@
 """PCD as it is written: what comes back, and what PCL and Open3D make of it."""
 
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -224,3 +225,12 @@ def test_real_scans_come_back(shared_data: Path, tmp_path: Path) -> None:
         for name, values in cloud.fields.items():
             assert again.fields[name].dtype == values.dtype
             np.testing.assert_array_equal(again.fields[name], values)
+
+
+def test_one_point_is_written_where_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "a.pcd"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        write(path, PointCloud(np.array([[1.3, -0.7, 6.1]])))
+    assert b"origin" not in path.read_bytes()
+    np.testing.assert_array_equal(read(path).points, [[1.3, -0.7, 6.1]])

@@ -59,9 +59,64 @@ def test_models_about_the_origin_or_beside_it(tmp_path: Path, shape: str) -> Non
         points = np.column_stack([np.cos(angle), np.sin(angle), rng.uniform(-1, 1, 9000)])
     else:
         points = np.concatenate([ball(4500) + shift for shift in ((0.7, 0, 0), (-0.7, 0, 0))])
-    for shift in ([0.0, 0.0, 0.0], [0.0, 0.0, 5.0], [389_000.0, 5_819_000.0, 40.0]):
+    for shift in ([0.0, 0.0, 0.0], [0.5, 5.0, 0.0], [389_000.0, 5_819_000.0, 40.0]):
         with pytest.warns(UserWarning, match="viewpoint"):
             assert read_pcd(tmp_path / "model.pcd", points + shift).viewpoint is None
+
+
+def room(rays: NDArray[np.float64], noise: float) -> NDArray[np.float64]:
+    """What a sensor at (0, 0, 0) measures in an empty room of 9 x 6.5 x 2.8 m."""
+    with np.errstate(divide="ignore"):
+        walls = np.maximum(np.array([-4.0, -3.0, -1.5]) / rays, np.array([5.0, 3.5, 1.3]) / rays)
+    distance = walls.min(axis=1) + np.random.default_rng(6).normal(0.0, noise, len(rays))
+    return np.asarray(rays * distance[:, None])
+
+
+def lines(elevations: NDArray[np.float64], azimuths: int) -> NDArray[np.float64]:
+    """Directions of a spinning lidar or a tripod scanner."""
+    turn = np.linspace(0, 2 * np.pi, azimuths, endpoint=False)
+    up, around = (part.ravel() for part in np.meshgrid(np.radians(elevations), turn))
+    return np.column_stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("count", [16, 32, 64, 128, 200])
+def test_a_scan_of_an_empty_room_keeps_its_viewpoint(tmp_path: Path, count: int, noise: float) -> None:
+    elevations = np.linspace(-60, 90, count) if count == 200 else np.linspace(-25, 15, count)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cloud = read_pcd(tmp_path / "room.pcd", room(lines(elevations, 720), noise))
+    np.testing.assert_array_equal(cloud.viewpoint, [0, 0, 0])
+
+
+def test_a_floor_at_a_grazing_angle_keeps_its_viewpoint(tmp_path: Path) -> None:
+    across, down = (part.ravel() for part in np.meshgrid(np.arange(-160, 160), np.arange(-120, 120)))
+    rays = np.column_stack([across / 386.0, down / 386.0, np.ones(across.size)])
+    depth = 1.0 / (rays @ [0.0, 0.995, 0.1])
+    seen = (depth > 0) & (depth < 20)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cloud = read_pcd(tmp_path / "floor.pcd", rays[seen] * depth[seen, None])
+    np.testing.assert_array_equal(cloud.viewpoint, [0, 0, 0])
+
+
+@pytest.mark.parametrize("shape", ["ring", "spheres of rows", "corner", "base"])
+def test_models_that_hide_little_of_themselves(tmp_path: Path, shape: str) -> None:
+    rng = np.random.default_rng(1)
+    around, along = rng.uniform(0, 2 * np.pi, (2, 9000))
+    if shape == "ring":
+        wide = 1 + 0.3 * np.cos(along)
+        points = np.column_stack([wide * np.cos(around), wide * np.sin(around), 0.3 * np.sin(along)])
+    elif shape == "spheres of rows":
+        # In rows like a scan, but each row at one distance.
+        points = lines(np.linspace(-80, 80, 60), 90)
+    elif shape == "corner":
+        points = rng.uniform(0, 1, (9000, 3))
+        points[np.arange(9000), rng.integers(0, 3, 9000)] = rng.choice([0.0, 1.0], 9000)
+    else:
+        points = ball(9000) + np.array([0, 0, 0.5])
+    with pytest.warns(UserWarning, match="viewpoint"):
+        assert read_pcd(tmp_path / "model.pcd", points).viewpoint is None
 
 
 def test_scans_from_the_origin_keep_it(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from surfsig.errors import FileFormatError
 from surfsig.files.colours import with_colours
 from surfsig.files.e57_names import field_names
 from surfsig.files.progress import Progress
-from surfsig.files.scans import joined, scan_number
+from surfsig.files.scans import joined_scans, scan_number
 from surfsig.point_cloud import PointCloud
 
 MAGIC = b"ASTM-E57"
@@ -35,12 +35,17 @@ def read(file: BinaryIO, source: str, progress: Progress, scan: int | None = Non
         If it is cut off, broken, or holds no scan.
     InvalidInputError
         If there is no scan of the number `scan`.
+
+    Warns
+    -----
+    UserWarning
+        If the colours of some scans have 8 bits and those of others 16.
     """
     reader = _surfsig.E57Reader(file, source, progress.advance)
     if not len(reader):
         raise FileFormatError(f"{source}: the E57 file holds no scan")
     if scan is None:
-        return joined([_scan(reader, number, source) for number in range(len(reader))])
+        return joined_scans([_scan(reader, number, source) for number in range(len(reader))], source)
     return _scan(reader, scan_number(scan, len(reader), source), source)
 
 

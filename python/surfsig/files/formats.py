@@ -265,6 +265,13 @@ def of_content(path: Path, head: bytes, size: int) -> tuple[Format, Reader]:
     if not head:
         raise FileFormatError(f"{path}: the file is empty")
     look = Look(head, path.suffix.lower(), size)
+    if head.startswith(WIDE_MARKS):
+        for name, magic in (("PLY", ply_header.MAGIC), ("PCD", pcd_header.MAGIC)):
+            if magic.match(look.text):
+                raise FileFormatError(
+                    f"{path}: is a {name} file in UTF-16, as Windows PowerShell writes output to files: save "
+                    "it as ASCII or UTF-8"
+                )
     by_name = next((kind for kind in FORMATS if look.extension in kind.extensions), None)
     readable = ", ".join(kind.name for kind in FORMATS if kind.read is not None)
     for kind in FORMATS:

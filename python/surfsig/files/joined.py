@@ -28,8 +28,8 @@ def joined(
 
     Coordinates are those of the clouds to the last bit: offsets from their common origin, or from 0 where
     they have different ones. Viewpoints are kept if every cloud has its own; the field ``scan`` then numbers
-    them. Fields are kept if every cloud has them, as one that holds the values of all; colours of 8 bits
-    become those of 16 where some have 16.
+    them. Fields are kept if every cloud with points has them, as one that holds the values of all; colours of
+    8 bits become those of 16 where some have 16.
 
     Parameters
     ----------
@@ -64,12 +64,16 @@ def joined(
     viewpoint, viewpoints = common_viewpoints([_viewpoints(cloud) for cloud in clouds])
     if viewpoints is not None:
         fields[SCAN] = _scans(clouds, len(viewpoints))
+    # A cloud without points lacks no values.
+    pairs = list(zip(clouds, in_16_bits, strict=True))
+    filled = [pair for pair in pairs if len(pair[0])] or pairs
     left_out = []
-    for name in dict.fromkeys(name for cloud in clouds for name in cloud.fields):
+    for name in dict.fromkeys(name for cloud, _ in filled for name in cloud.fields):
         if name == SCAN and viewpoints is not None and any(cloud.viewpoints is not None for cloud in clouds):
             # Those are in the new numbers.
             continue
-        values = _joined_field([cloud.fields.get(name) for cloud in clouds], name, in_16_bits)
+        parts = [(cloud.fields.get(name), of_bytes) for cloud, of_bytes in filled]
+        values = _joined_field([part for part, _ in parts], name, [of_bytes for _, of_bytes in parts])
         if values is None:
             left_out.append(name)
         else:

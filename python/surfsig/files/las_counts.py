@@ -74,12 +74,18 @@ def agreed_count(
             f"{chosen} were read",
             stacklevel=2,
         )
+    by_return = int(header.number_of_points_by_return.sum())
     if chosen >= held.least:
+        if held.least < held.most and chosen < by_return <= held.most:
+            warnings.warn(
+                f"{source}: its header promises {chosen} points, and {by_return} by their returns; {chosen} "
+                "were read",
+                stacklevel=2,
+            )
         return chosen
     more = f"its header promises {chosen} points"
     if chosen == 0 and held.least != held.most:
         raise FileFormatError(f"{source}: {more}, but points follow, of which the number is not known")
-    by_return = int(header.number_of_points_by_return.sum())
     if chosen == 0 or (held.whole and by_return != chosen and held.least == held.most):
         rest = "" if held.whole else ", and what follows them is no whole point"
         warnings.warn(

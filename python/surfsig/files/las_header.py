@@ -38,6 +38,9 @@ _LONGEST_PROJECTION = 1 << 20
 # Coordinates in any unit of length; beyond, they could become infinite or all the same.
 _SMALLEST_SCALE, _LARGEST_SCALE, _LARGEST_OFFSET = 1e-30, 1e30, 1e200
 _LARGEST_NUMBER = 2.0**31
+# Steps of the stored numbers that float64 may round away at the offset: a thousand are no coordinates.
+_COARSEST = 1000.0
+_LAST_POINT_FORMAT = 10
 
 
 class _Record(NamedTuple):
@@ -71,6 +74,13 @@ def read_header(
     if header_size < _HEADER_BYTES.get(minor, LARGEST_HEADER):
         raise FileFormatError(
             f"{source}: cut off or broken: Incoherent header size: {header_size} bytes for LAS 1.{minor}"
+        )
+    # The two highest bits say that the points are compressed.
+    kind = head[104] & 0x3F
+    if kind > _LAST_POINT_FORMAT:
+        raise FileFormatError(
+            f"{source}: its header names point format {kind}, of which LAS has none "
+            f"(0 to {_LAST_POINT_FORMAT})"
         )
     head = head[:header_size]
     if header_size + count * _RECORD_HEAD.size > size:
@@ -108,6 +118,11 @@ def check_coordinates(header: LasHeader, source: str) -> None:
             raise FileFormatError(
                 f"{source}: the scale of {axis} in its header is {scale:g}, so that all points would have "
                 f"the same {axis}: the header is broken"
+            )
+        if np.spacing(offset) > _COARSEST * scale:
+            raise FileFormatError(
+                f"{source}: the offset of {axis} in its header is {offset:g}, beside which steps of "
+                f"{scale:g} are lost: the header is broken"
             )
 
 

@@ -76,21 +76,25 @@ def files_meant(paths: Paths) -> list[Path] | None:
     Raises
     ------
     OSError
-        If nothing matches a pattern.
+        If nothing matches a pattern, or a path is empty.
     FileFormatError
         If a folder holds no files.
     InvalidInputError
         If there is no path at all.
     """
     if isinstance(paths, (str, os.PathLike)):
-        if not os.fspath(paths):
-            # Python takes it for the folder in which the program runs.
-            raise InvalidInputError("the path is empty")
-        return _expanded(Path(paths))
-    files = [file for path in paths for file in _expanded(Path(path)) or [Path(path)]]
+        return _expanded(_path(paths))
+    files = [file for path in map(_path, paths) for file in _expanded(path) or [path]]
     if not files:
         raise InvalidInputError("there are no files")
     return files
+
+
+def _path(path: PathLike) -> Path:
+    if not os.fspath(path):
+        # `Path` would take the current folder for it.
+        raise InvalidInputError("the path is empty")
+    return Path(path)
 
 
 def _expanded(path: Path) -> list[Path] | None:

@@ -146,9 +146,10 @@ def _read_compressed(
         data: bytes | None = b""
     else:
         try:
-            data = lzf.decompress(file.read(packed), unpacked)
+            data = lzf.decompress(stored := file.read(packed), unpacked)
         except ValueError:
-            data = None
+            # pypcd stores what compression would not make smaller as it is.
+            data = stored if packed == unpacked else None
     progress.advance(packed)
     if data is None or len(data) != unpacked:
         raise FileFormatError(f"{source}: its compressed data are broken")

@@ -116,9 +116,10 @@ def _origin(cloud: PointCloud) -> NDArray[np.float64]:
     with np.errstate(over="ignore", invalid="ignore"):
         extent = float((high - low).max())
         moved = max(float(np.abs(part.astype(np.float32) - part).max()) for part in blocks_of(points))
-        if moved <= _ROUNDING * extent or not np.isfinite([extent, moved]).all():
+        # Points that are all in one place have no distances that float could spoil.
+        if not extent or moved <= _ROUNDING * extent or not np.isfinite([extent, moved]).all():
             return np.zeros(3)
-    step = 10.0 ** np.floor(np.log10(extent)) if extent > 0 else 1.0
+    step = 10.0 ** np.floor(np.log10(extent))
     origin: NDArray[np.float64] = np.rint((low + high) / 2 / step) * step + 0.0
     return origin
 

@@ -15,7 +15,7 @@ from surfsig.files.columns import cloud_from_columns
 from surfsig.files.encodings import decoded
 from surfsig.files.lines import line_blocks, parse, warn_unterminated
 from surfsig.files.progress import Progress
-from surfsig.files.scans import joined, scan_number
+from surfsig.files.scans import joined_scans, scan_number
 from surfsig.point_cloud import PointCloud
 
 # Two counts, a position of three numbers, three axes and the first row of a matrix.
@@ -80,7 +80,7 @@ def read(file: BinaryIO, source: str, progress: Progress, scan: int | None = Non
     scans = list(_scans(file, source, progress))
     if scan is not None:
         return _cloud(scans[scan_number(scan, len(scans), source)], source)
-    return joined([_cloud(each, source) for each in scans])
+    return joined_scans([_cloud(each, source) for each in scans], source)
 
 
 def _scans(file: BinaryIO, source: str, progress: Progress) -> Iterator[_Scan]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.errors import InvalidInputError
+from surfsig.files.colours import CHANNELS
 from surfsig.files.joined import common_viewpoints
 from surfsig.point_cloud import PointCloud
 
@@ -33,10 +35,15 @@ def scan_number(scan: object, count: int, source: str) -> int:
     return number
 
 
-def joined(clouds: Sequence[PointCloud]) -> PointCloud:
+def joined_scans(clouds: Sequence[PointCloud], source: str) -> PointCloud:
     """Join scans into one cloud whose field ``scan`` gives each point's, from 0; a single one stays as it is.
 
     A field that one of them lacks is NaN there, or 0 if it holds whole numbers.
+
+    Warns
+    -----
+    UserWarning
+        If the colours of some have 8 bits and those of others 16.
     """
     if len(clouds) == 1:
         return clouds[0]
@@ -47,6 +54,14 @@ def joined(clouds: Sequence[PointCloud]) -> PointCloud:
         )
     }
     names = dict.fromkeys(name for cloud in clouds for name in cloud.fields)
+    if {np.dtype(np.uint8), np.dtype(np.uint16)} <= {
+        cloud.fields[CHANNELS[0]].dtype for cloud in clouds if CHANNELS[0] in cloud.fields
+    }:
+        warnings.warn(
+            f"{source}: the colours of some scans are 0 to 255, those of others go beyond: they are kept as "
+            "they are, and may be on different scales",
+            stacklevel=3,
+        )
     for name in names:
         kind = np.result_type(*(cloud.fields[name].dtype for cloud in clouds if name in cloud.fields))
         missing = np.nan if kind.kind == "f" else 0

@@ -22,7 +22,7 @@ from surfsig.files.lines import (
     warn_unterminated,
 )
 from surfsig.files.progress import Progress
-from surfsig.files.scans import joined, scan_number
+from surfsig.files.scans import joined_scans, scan_number
 from surfsig.files.text_layout import Layout, count_of, layout_of
 from surfsig.point_cloud import PointCloud
 
@@ -72,7 +72,7 @@ def read(
     if scan is not None:
         tables = [tables[scan_number(scan, len(tables), source)]]
     names = [layout.names[i] for i in layout.kept]
-    return joined(
+    return joined_scans(
         [
             cloud_from_columns(
                 {name: table[:, i] for i, name in enumerate(names)},
@@ -82,7 +82,8 @@ def read(
                 unit=unit,
             )
             for _, table in tables
-        ]
+        ],
+        source,
     )
 
 
