@@ -296,5 +296,5 @@ def test_a_file_without_points_takes_no_fields_away(tmp_path: Path) -> None:
 
 def test_an_empty_path_is_not_the_current_folder() -> None:
     for paths in ("", [""]):
-        with pytest.raises(FileNotFoundError):
+        with pytest.raises(InvalidInputError, match="the path is empty"):
             read(paths)

@@ -24,10 +24,21 @@ RATIOS = [
 
 def scans() -> tuple[Any, Any]:
     rng = np.random.default_rng(12)
-    return terrain(rng, 1500, -1.1, 0.9), terrain(rng, 1500, -0.9, 1.1)
+    return terrain(rng, 2500, -1.1, 0.9), terrain(rng, 2500, -0.9, 1.1)
 
 
 @pytest.mark.parametrize(("ratio", "units"), RATIOS)
+@pytest.mark.parametrize("near", [0.85, 1.0, 1.15])
+def test_a_ratio_of_two_units_is_named(ratio: float, units: str, near: float) -> None:
+    source, target = scans()
+    told = surfsig.unit_mismatch(source * ratio * near, target, ("this", "that"))
+    assert told is not None
+    assert told.startswith("this is ")
+    assert units in told
+    assert surfsig.unit_mismatch(source, target * ratio * near, ("this", "that")) is not None
+
+
+@pytest.mark.parametrize(("ratio", "units"), [RATIOS[0], RATIOS[2]])
 def test_registration_names_the_units(ratio: float, units: str) -> None:
     source, target = scans()
     with pytest.warns(UserWarning, match=f"source is .* times as large as target.*{units}"):
@@ -50,10 +61,9 @@ def test_scans_of_one_unit_are_not_said_to_differ() -> None:
     assert surfsig.unit_mismatch(source, np.zeros((5, 3))) is None
 
 
-@pytest.mark.parametrize("ratio", [1000.0, 25.4])
-def test_finding_names_the_units(ratio: float) -> None:
+def test_finding_names_the_units() -> None:
     scene, model = finding_scene("figure", 2, copies=1, others=1).cloud, whole("figure")
-    larger = PointCloud(model.points * ratio)
+    larger = PointCloud(model.points * 1000.0)
     with pytest.warns(UserWarning, match="nothing was found, and the model 'model' has points .* apart"):
         assert not len(surfsig.find(larger, scene))
 
