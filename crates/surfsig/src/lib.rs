@@ -40,6 +40,7 @@ mod extract;
 mod field;
 mod fit;
 mod frame;
+mod geometry;
 mod hierarchy;
 mod members;
 mod moments;
@@ -55,7 +56,7 @@ mod threads;
 
 pub use cell_index::CellIndex;
 pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
-pub use depth_image::{DepthImage, Judgement, Pose, SurfacePlace};
+pub use depth_image::{DepthImage, Judgement, SurfacePlace};
 pub use error::Error;
 pub use extract::{
     ExtractOptions, Extraction, Monitor, Neighborhood, Queries, Status, extract, extract_auto_radius,
@@ -69,6 +70,7 @@ pub use fit::{
     Cylinder, FitAxes, FitKind, FitUsed, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere,
 };
 pub use frame::{Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};
+pub use geometry::{RigidTransform, TransformError};
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
