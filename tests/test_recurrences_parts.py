@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from recurrences import adjusted_rand_index
 
+from surfsig.alignment.free_directions import free_directions, free_directions_of_surface
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences.equal_surfaces import equal_surfaces
-from surfsig.recurrences.free_directions import free_directions, free_directions_of_surface
 from surfsig.recurrences.grouping import groups_of, ways_from_first
 from surfsig.recurrences.main_surface import may_be_equal
 from surfsig.recurrences.matching import common_share
