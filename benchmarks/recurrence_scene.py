@@ -137,4 +137,4 @@ def _reach(surface: simulate.Surface, pose: Array, rotation: Array) -> float:
     side = np.linspace(-0.045, 0.045, 91)
     grid = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
     inside = surface.implicit(grid) <= 0.0
-    return float((simulate.transform(pose, grid[inside]) @ rotation[2]).max())
+    return float((simulate.transform_points(pose, grid[inside]) @ rotation[2]).max())

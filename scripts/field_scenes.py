@@ -59,7 +59,7 @@ def two_scans(seed: int, places: int) -> TwoScans:
     motion = motions[1] @ simulate.inverse(motions[0])
     first, second = (cloud.points for cloud in clouds)
     chosen = first[rng.choice(len(first), min(len(first), 3 * places), replace=False)]
-    distance, partner = cKDTree(second).query(simulate.transform(motion, chosen))
+    distance, partner = cKDTree(second).query(simulate.transform_points(motion, chosen))
     same = np.flatnonzero(distance < NEAR)[:places]
     return TwoScans((clouds[0], clouds[1]), (chosen[same], second[partner[same]]), motion)
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 import surfsig
 from surfsig import InvalidInputError, Odometry, PointCloud, ScanStatus, TimedScan, simulate
+from surfsig.geometry import adjoint
 from surfsig.odometry.alignment import Alignment, Scan
 from surfsig.odometry.local_map import LocalMap
-from surfsig.odometry.motion import adjoint, small
 from surfsig.odometry.panorama import Panorama
 from surfsig.odometry.scale import Scale
 from surfsig.odometry.usual import Usual
@@ -255,14 +255,6 @@ def test_mistakes_are_told() -> None:
         surfsig.odometry([])
     with pytest.raises(InvalidInputError, match="scans must be several"):
         surfsig.odometry(cloud)  # type: ignore[arg-type]
-
-
-def test_the_adjoint_carries_small_motions() -> None:
-    rng = np.random.default_rng(1)
-    pose = small(np.concatenate([rng.normal(size=3), rng.normal(size=3)]))
-    motion = 1e-6 * rng.normal(size=6)
-    carried = pose @ small(motion) @ np.linalg.inv(pose)
-    np.testing.assert_allclose(small(adjoint(pose) @ motion), carried, atol=1e-11)
 
 
 def test_the_map_keeps_the_first_place_of_each_voxel() -> None:

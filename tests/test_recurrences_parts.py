@@ -9,13 +9,14 @@ import pytest
 from numpy.typing import NDArray
 from recurrences import adjusted_rand_index
 
+from surfsig.alignment.free_directions import free_directions, free_directions_of_surface
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences.equal_surfaces import equal_surfaces
-from surfsig.recurrences.free_directions import free_directions, free_directions_of_surface
 from surfsig.recurrences.grouping import groups_of, ways_from_first
 from surfsig.recurrences.main_surface import may_be_equal
 from surfsig.recurrences.matching import common_share
 from surfsig.recurrences.pieces import pieces_of
+from surfsig.recurrences.point_pairs import PointPairs, proposed_poses
 from surfsig.recurrences.shadows import Region, direction_of_sensor, places_without_points, second_place
 from surfsig.spacing import point_spacing
 from surfsig.surfaces import Surface, Surfaces
@@ -249,3 +250,17 @@ def test_shadows_tell_a_second_place() -> None:
     assert shift is not None
     assert angle_between(eye + shift, camera) < 5.0
     assert second_place([shadowed(unit(*eye))], [eye], 1.0) is None
+
+
+def test_pairs_along_a_normal_propose_no_pose() -> None:
+    """Of two parallel plates, points above each other leave the turn about the normal open."""
+    grid = np.stack(np.meshgrid(np.arange(4.0), np.arange(4.0)), axis=-1).reshape(-1, 2)
+    points = np.concatenate([np.column_stack([grid, np.full(16, height)]) for height in (0.0, 3.0)])
+    normals = np.repeat([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]], 16, axis=0)
+    pairs = PointPairs.of(points, normals, 1.0)
+    poses = proposed_poses(pairs, pairs, 4000, np.random.default_rng(1))
+    assert len(poses) > 100
+    rotations = poses[:, :3, :3]
+    np.testing.assert_allclose(
+        rotations @ rotations.swapaxes(1, 2), np.broadcast_to(np.eye(3), rotations.shape), atol=1e-12
+    )

@@ -93,7 +93,7 @@ def test_every_point_is_lit_and_seen() -> None:
             for solid in scene.objects[1:5]:
                 assert (solid.implicit(between) > 0.0).all()
             # The wavy sheet may be passed by, but not crossed: over it, a ray stays on one side.
-            over = (np.abs(sim.transform(sim.inverse(field.pose), between)[:, :2]) < 0.02).all(axis=1)
+            over = (np.abs(sim.transform_points(sim.inverse(field.pose), between)[:, :2]) < 0.02).all(axis=1)
             side = np.where(over, np.sign(field.implicit(between)), 0.0)
             assert (side * side_before >= 0.0).all()
             side_before = side

@@ -65,7 +65,7 @@ def test_first_hit_agrees_with_bisection(surface: Any) -> None:
     # A pose of no symmetry, and rays given in the scene.
     placed = sim.Placed(surface, sim.pose((0.01, -0.02, 0.005), sim.turn((1.0, -2.0, 0.5), 1.1)))
     to_scene = placed.pose[:3, :3].T
-    hits = sim.Scene([placed]).cast(sim.transform(placed.pose, origins), directions @ to_scene)
+    hits = sim.Scene([placed]).cast(sim.transform_points(placed.pose, origins), directions @ to_scene)
     expected = np.array([first_by_bisection(surface, o, d) for o, d in zip(origins, directions, strict=True)])
     reach = REACH / np.linalg.norm(directions, axis=1)
     hit = np.where(hits.t < reach, hits.t, np.inf)
@@ -188,10 +188,10 @@ def test_a_hole_cut_by_a_ball_leaves_no_gap() -> None:
     # The cuts move with the scene.
     motion = sim.pose((0.1, 0.2, -0.3), sim.turn((0.3, 1.0, -0.2), 2.0))
     moved = scene.moved(motion).cast(
-        sim.transform(motion, origins), np.tile((0.0, 0.0, -1.0), (len(x), 1)) @ motion[:3, :3].T
+        sim.transform_points(motion, origins), np.tile((0.0, 0.0, -1.0), (len(x), 1)) @ motion[:3, :3].T
     )
     np.testing.assert_array_equal(moved.surface, hits.surface)
-    np.testing.assert_allclose(moved.points, sim.transform(motion, hits.points), atol=1e-12)
+    np.testing.assert_allclose(moved.points, sim.transform_points(motion, hits.points), atol=1e-12)
 
 
 def test_poses() -> None:

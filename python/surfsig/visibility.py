@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from surfsig.geometry import axes_across
 from surfsig.point_cloud import PointCloud
 from surfsig.spacing import point_spacing
 
@@ -199,14 +200,18 @@ def _are_in_rows(rays: Array, distances: Array) -> bool:
 
 def _hidden_share(rays: Array, distances: Array, spacing: float) -> float:
     # Angles about an axis square to the mean ray, as lengths at the median distance: parallel lines of sight.
-    forward = rays.mean(axis=0)
-    pole = np.cross(forward, np.eye(3)[np.abs(forward).argmin()])
-    pole /= np.linalg.norm(pole) or 1.0
-    side = np.cross(pole, forward)
-    side /= np.linalg.norm(side) or 1.0
-    ahead = np.cross(side, pole)
+    mean = rays.mean(axis=0)
+    length = float(np.linalg.norm(mean))
+    if length == 0.0:
+        # The viewpoint is the very centre of the points: that of a model, not a sensor's.
+        return 1.0
+    ahead = mean / length
+    pole, across = axes_across(ahead)
     middle = float(np.median(distances))
-    angles = np.arctan2(rays @ side, rays @ ahead), np.arcsin(np.clip(rays @ pole / distances, -1.0, 1.0))
+    angles = (
+        np.arctan2(rays @ -across, rays @ ahead),
+        np.arcsin(np.clip(rays @ pole / distances, -1.0, 1.0)),
+    )
     # Of the distance the logarithm, as spacing and noise grow with it.
     depth = middle * np.log(distances / middle)
     spacing = max(spacing, middle / _FINEST)

@@ -4,7 +4,7 @@ use crate::{invalid_input, rows};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use numpy::{PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use surfsig::{Judgement, Pose, SurfacePlace};
+use surfsig::{Judgement, RigidTransform, SurfacePlace};
 
 /// Places on a surface with unit normals, (n, 3) each, float32.
 #[pyclass(frozen, module = "surfsig")]
@@ -65,7 +65,7 @@ impl DepthImage {
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let poses = poses_of(&poses)?;
         let places = &places.places[..most.min(places.places.len())];
-        let found = py.detach(|| self.image.judge_all(poses, places, tolerance));
+        let found = py.detach(|| self.image.judge_all(&poses, places, tolerance));
         let row = |judged: &Judgement| [judged.confirmed, judged.contradicted, judged.astray, judged.missing];
         let shares: Vec<f32> = found.iter().flat_map(row).collect();
         shares.into_pyarray(py).reshape([found.len(), 4])
@@ -84,9 +84,9 @@ impl DepthImage {
     ) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
         let wrong = || invalid_input("expected a C-contiguous array of shape (4, 4)");
         let (pose, _) = rows::<_, 4>(&pose)?.as_chunks::<4>();
-        let pose: &Pose = pose.first().ok_or_else(wrong)?;
+        let pose = transform(pose.first().ok_or_else(wrong)?)?;
         let places = &places.places[..most.min(places.places.len())];
-        let found = py.detach(|| self.image.correspondences(pose, places, tolerance));
+        let found = py.detach(|| self.image.correspondences(&pose, places, tolerance));
         let kept: Vec<(i64, SurfacePlace)> =
             (0..).zip(found).filter_map(|(number, there)| Some((number, there?))).collect();
         let numbers: Vec<i64> = kept.iter().map(|(number, _)| *number).collect();
@@ -98,10 +98,14 @@ impl DepthImage {
     }
 }
 
-/// The matrices of an (n, 4, 4) array that stands row by row in memory.
-pub(crate) fn poses_of<'a>(poses: &'a PyReadonlyArray3<'_, f64>) -> PyResult<&'a [Pose]> {
+/// The transforms of an (n, 4, 4) array that stands row by row in memory.
+pub(crate) fn poses_of(poses: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<RigidTransform>> {
     if !poses.is_c_contiguous() || poses.shape()[1..] != [4, 4] {
         return Err(invalid_input("expected a C-contiguous array of shape (n, 4, 4)"));
     }
-    Ok(poses.as_slice()?.as_chunks::<4>().0.as_chunks::<4>().0)
+    poses.as_slice()?.as_chunks::<4>().0.as_chunks::<4>().0.iter().map(transform).collect()
+}
+
+fn transform(matrix: &[[f64; 4]; 4]) -> PyResult<RigidTransform> {
+    RigidTransform::from_matrix(matrix).map_err(|error| invalid_input(&error.to_string()))
 }

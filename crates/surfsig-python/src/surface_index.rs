@@ -4,6 +4,7 @@ use crate::depth_image::{SurfacePlaces, poses_of};
 use crate::{invalid_input, to_python};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray3};
 use pyo3::prelude::*;
+use surfsig::RigidTransform;
 
 /// See the crate's `SurfaceIndex`.
 #[pyclass(frozen, module = "surfsig")]
@@ -47,9 +48,9 @@ impl SurfaceIndex {
         threads: Option<usize>,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (poses, reaches) = (poses_of(&poses)?, reaches.as_slice()?);
-        let work = || self.index.settle_all(poses, &places.places, reaches);
+        let work = || self.index.settle_all(&poses, &places.places, reaches);
         let settled = py.detach(|| surfsig::with_threads(threads, work)).map_err(to_python)?;
-        let numbers: Vec<f64> = settled.iter().flatten().flatten().copied().collect();
+        let numbers: Vec<f64> = settled.iter().flat_map(RigidTransform::to_matrix).flatten().collect();
         numbers.into_pyarray(py).reshape([poses.len(), 4, 4])
     }
 }

@@ -3,9 +3,8 @@
 //! A [`BallVisitor`] is told the members of a ball, block by block; what it makes of them is its own
 //! affair: moments today, a robust re-weighting or a pooled descriptor as well.
 
-use crate::block_sums::BlockSums;
-use crate::cell_index::{CellIndex, Row, RowKey};
-use crate::moments::{Moments, Scalar};
+use crate::cell_index::{CellIndex, Row};
+use crate::lattice::RowKey;
 use crate::simd::InstructionSet;
 use crate::simd::select::{BLOCK, Ball, Block, Place, Rows, Window, gather};
 
@@ -165,14 +164,6 @@ impl DirectWalk<'_> {
                 self.windows.push(Window { ranks: start..end, between: near.between });
             }
         }
-    }
-
-    /// The moments of the ball around the query at this offset from the row's middle, about the
-    /// query, in units of the radius. `S` is what the sums within a block are kept in.
-    pub fn moments<S: Scalar>(&mut self, offset: [f32; 3]) -> Moments<f64> {
-        let mut sums = BlockSums::<S>::new(self.set);
-        self.visit(offset, &mut sums);
-        sums.total
     }
 }
 

@@ -1,6 +1,6 @@
 //! The visitor that sums.
 
-use crate::ball::BallVisitor;
+use crate::ball::{BallVisitor, DirectWalk};
 use crate::moments::{Moments, Scalar};
 use crate::simd::InstructionSet;
 use crate::simd::accumulate::accumulate;
@@ -25,6 +25,16 @@ impl<S: Scalar> BallVisitor for BlockSums<S> {
 
     fn visit(&mut self, block: &Block, len: usize) {
         add_block::<S>(&mut self.total, self.set, block, len);
+    }
+}
+
+impl DirectWalk<'_> {
+    /// The moments of the ball around the query at this offset from the row's middle, about the
+    /// query, in units of the radius. `S` is what the sums within a block are kept in.
+    pub fn moments<S: Scalar>(&mut self, offset: [f32; 3]) -> Moments<f64> {
+        let mut sums = BlockSums::<S>::new(self.set);
+        self.visit(offset, &mut sums);
+        sums.total
     }
 }
 

@@ -1,7 +1,7 @@
 //! Curvature of a paraboloid: at its centre, for fits; over the paper's grid, for signatures.
 
-use crate::fit::tensor::{Axes, Vector, add_scaled, cross, inverted, normalised};
 use crate::simd::lanes::{Lanes, Mask};
+use crate::tensor::{Axes, Vector, add_scaled, cross, inverted, normalised};
 
 /// Samples along a side of the patch: 40 mm in steps of 4 mm.
 pub const GRID: usize = 11;

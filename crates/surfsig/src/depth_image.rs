@@ -1,5 +1,8 @@
 //! What a sensor saw around a piece of a scan, as a depth image; and whether poses of another piece agree.
 
+use crate::geometry::{RigidTransform, axes_across};
+use nalgebra::Vector3;
+
 /// Pixels along a side, however dense the scan.
 const MOST_PIXELS: f64 = 512.0;
 /// Squared pixels around a point of the scan that it speaks for; a pixel is a point spacing wide.
@@ -12,9 +15,6 @@ const ALIKE: f32 = 0.8;
 const BESIDE: f32 = 4.0;
 /// Cosine to the line of sight from which on a surface is not too steep to be measured (65 degrees).
 const FACING: f32 = 0.42;
-
-/// A pose as a matrix that turns and shifts, row by row.
-pub type Pose = [[f64; 4]; 4];
 
 /// A place on a surface, with the unit normal on the sensor's side.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,7 +66,7 @@ struct Pixel {
 /// The origin is the piece's middle; the image plane is square to the line of sight to it.
 ///
 /// ```
-/// use surfsig::{DepthImage, SurfacePlace};
+/// use surfsig::{DepthImage, RigidTransform, SurfacePlace};
 ///
 /// // A square, one apart, seen from above; the same square, moved on to its side.
 /// let square: Vec<SurfacePlace> = (0..400)
@@ -74,7 +74,7 @@ struct Pixel {
 ///     .map(|place| SurfacePlace { place, normal: [0.0, 0.0, 1.0] })
 ///     .collect();
 /// let image = DepthImage::new(&square, &[true; 400], [0.0, 0.0, 1000.0], 1.0, 30.0, None);
-/// let moved = |x| [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+/// let moved = |x| RigidTransform::from_rotation_vector([0.0; 3], [x, 0.0, 0.0]);
 /// let [there, beside] = [0.0, 15.0].map(|x| image.judge(&moved(x), &square, 0.3));
 /// assert_eq!((there.confirmed, there.missing), (1.0, 0.0));
 /// assert!(beside.confirmed < 0.4 && beside.missing > 0.5);
@@ -176,7 +176,7 @@ impl DepthImage {
     /// Tells what the scan says about surface places that a pose moves into it.
     ///
     /// `tolerance` is the height within which a place is on a surface.
-    pub fn judge(&self, pose: &Pose, places: &[SurfacePlace], tolerance: f32) -> Judgement {
+    pub fn judge(&self, pose: &RigidTransform, places: &[SurfacePlace], tolerance: f32) -> Judgement {
         let (turn, shift) = self.composed(pose);
         let mut counts = [0_u32; 4];
         for point in places {
@@ -219,7 +219,12 @@ impl DepthImage {
     }
 
     /// The same for many poses.
-    pub fn judge_all(&self, poses: &[Pose], places: &[SurfacePlace], tolerance: f32) -> Vec<Judgement> {
+    pub fn judge_all(
+        &self,
+        poses: &[RigidTransform],
+        places: &[SurfacePlace],
+        tolerance: f32,
+    ) -> Vec<Judgement> {
         poses.iter().map(|pose| self.judge(pose, places, tolerance)).collect()
     }
 
@@ -227,7 +232,7 @@ impl DepthImage {
     /// scan's axes; `None` for others.
     pub fn correspondences(
         &self,
-        pose: &Pose,
+        pose: &RigidTransform,
         places: &[SurfacePlace],
         tolerance: f32,
     ) -> Vec<Option<SurfacePlace>> {
@@ -292,24 +297,20 @@ impl DepthImage {
     }
 
     /// The pose, and then into the image's axes.
-    fn composed(&self, pose: &Pose) -> ([[f32; 3]; 3], [f32; 3]) {
-        let entry = |axis: &[f32; 3], column: usize| {
-            (0..3).map(|k| f64::from(axis[k]) * pose[k][column]).sum::<f64>() as f32
-        };
+    fn composed(&self, pose: &RigidTransform) -> ([[f32; 3]; 3], [f32; 3]) {
+        let axes = self.axes.map(|axis| Vector3::from(axis.map(f64::from)));
         (
-            self.axes.map(|axis| [0, 1, 2].map(|column| entry(&axis, column))),
-            self.axes.map(|axis| entry(&axis, 3)),
+            axes.map(|axis| [0, 1, 2].map(|column| axis.dot(&pose.rotation.column(column)) as f32)),
+            axes.map(|axis| axis.dot(&pose.translation) as f32),
         )
     }
 }
 
 /// Three axes square to each other, the last one along a unit vector.
 fn axes_towards(forward: [f64; 3]) -> [[f32; 3]; 3] {
-    let forward = nalgebra::Vector3::from(forward);
-    let mut across = nalgebra::Vector3::zeros();
-    across[forward.iamin()] = 1.0;
-    let side = forward.cross(&across).normalize();
-    [side, forward.cross(&side), forward].map(|axis| axis.map(|x| x as f32).into())
+    let forward = Vector3::from(forward);
+    let [side, other] = axes_across(&forward);
+    [side, other, forward].map(|axis| axis.map(|x| x as f32).into())
 }
 
 pub(crate) fn dot(a: &[f32; 3], b: &[f32; 3]) -> f32 {
@@ -341,10 +342,6 @@ mod tests {
         rows.flat_map(row).collect()
     }
 
-    fn unmoved() -> Pose {
-        std::array::from_fn(|i| std::array::from_fn(|j| f64::from(i == j)))
-    }
-
     /// A square of 21 before a wall, with a strip from x = 16 to 22 where nothing was measured.
     fn image(second: Option<[f64; 3]>) -> DepthImage {
         let square = board(-10..11, -10..11, 0.0);
@@ -355,7 +352,7 @@ mod tests {
     }
 
     fn judged(image: &DepthImage, point: SurfacePlace) -> [f32; 4] {
-        let found = image.judge(&unmoved(), &[point], 0.3);
+        let found = image.judge(&RigidTransform::identity(), &[point], 0.3);
         [found.confirmed, found.contradicted, found.astray, found.missing]
     }
 
@@ -394,8 +391,7 @@ mod tests {
     #[test]
     fn correspondences_are_the_points_there_in_the_axes_of_the_scan() {
         let image = image(None);
-        let mut pose = unmoved();
-        pose[0][3] = 3.0;
+        let pose = RigidTransform::from_rotation_vector([0.0; 3], [3.0, 0.0, 0.0]);
         let found = image.correspondences(&pose, &[at(0.2, 4.1, 0.1), at(12.0, 4.0, 0.1)], 0.3);
         let near = found[0].expect("on the square");
         let apart = |a: [f32; 3], b: [f32; 3]| (0..3).map(|i| (a[i] - b[i]).abs()).fold(0.0, f32::max);

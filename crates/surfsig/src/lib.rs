@@ -40,26 +40,31 @@ mod extract;
 mod field;
 mod fit;
 mod frame;
+mod geometry;
 mod hierarchy;
+mod lattice;
 mod members;
 mod moments;
+mod monitor;
 mod point_cloud;
 mod primitive;
 mod resolution;
 mod shells;
 mod simd;
 mod similarity;
+mod status;
 mod surface_index;
 mod surfaces;
+mod tensor;
 mod threads;
 
 pub use cell_index::CellIndex;
 pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
-pub use depth_image::{DepthImage, Judgement, Pose, SurfacePlace};
+pub use depth_image::{DepthImage, Judgement, SurfacePlace};
 pub use error::Error;
 pub use extract::{
-    ExtractOptions, Extraction, Monitor, Neighborhood, Queries, Status, extract, extract_auto_radius,
-    extract_monitored, extract_radii, voxel_representatives,
+    ExtractOptions, Extraction, Neighborhood, Queries, extract, extract_auto_radius, extract_monitored,
+    extract_radii, voxel_representatives,
 };
 pub use field::{
     FIELD_PHASES, FIELD_SIGNATURE, FieldOptions, FieldPatches, FieldPhases, FieldSignature,
@@ -69,12 +74,15 @@ pub use fit::{
     Cylinder, FitAxes, FitKind, FitUsed, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere,
 };
 pub use frame::{Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};
+pub use geometry::{RigidTransform, TransformError};
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
+pub use monitor::Monitor;
 pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
 pub use resolution::{COARSEST_STEP, Resolution};
 pub use simd::InstructionSet;
 pub use similarity::{GOOD, OPTIMAL, SimilarityClass, similarity};
+pub use status::Status;
 pub use surface_index::SurfaceIndex;
 pub use surfaces::{FEWEST_SURFACE_POINTS, FoundSurface, FoundSurfaces, SurfaceOptions, find_surfaces};
 pub use threads::with_threads;

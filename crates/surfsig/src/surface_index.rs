@@ -1,7 +1,8 @@
 //! Places of a surface, found by where they are and how they face; and poses of other surfaces fitted to them.
 
-use crate::depth_image::{Pose, SurfacePlace, dot};
-use nalgebra::{Matrix6, SymmetricEigen, UnitQuaternion, Vector3, Vector6};
+use crate::depth_image::{SurfacePlace, dot};
+use crate::geometry::RigidTransform;
+use nalgebra::{Matrix6, SymmetricEigen, Vector3, Vector6};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -80,15 +81,20 @@ impl SurfaceIndex {
     }
 
     /// For places that a pose moves to this surface the numbers of [`SurfaceIndex::nearest`].
-    pub fn partners(&self, pose: &Pose, places: &[SurfacePlace], reach: f32) -> Vec<Option<usize>> {
+    pub fn partners(&self, pose: &RigidTransform, places: &[SurfacePlace], reach: f32) -> Vec<Option<usize>> {
         places.iter().map(|point| self.nearest(&moved(pose, point), reach)).collect()
     }
 
     /// Fits poses of other surface places to this surface by point to plane: a step for each of `reaches`.
     ///
     /// Motions that the surface does not hold are not made.
-    pub fn settle_all(&self, poses: &[Pose], places: &[SurfacePlace], reaches: &[f32]) -> Vec<Pose> {
-        let settled = |pose: &Pose| {
+    pub fn settle_all(
+        &self,
+        poses: &[RigidTransform],
+        places: &[SurfacePlace],
+        reaches: &[f32],
+    ) -> Vec<RigidTransform> {
+        let settled = |pose: &RigidTransform| {
             let mut pose = *pose;
             for &reach in reaches {
                 let Some(better) = self.stepped(&pose, places, reach) else { break };
@@ -100,7 +106,7 @@ impl SurfaceIndex {
     }
 
     /// One step of point to plane; `None` where too little of the places is near.
-    fn stepped(&self, pose: &Pose, places: &[SurfacePlace], reach: f32) -> Option<Pose> {
+    fn stepped(&self, pose: &RigidTransform, places: &[SurfacePlace], reach: f32) -> Option<RigidTransform> {
         let pairs: Vec<(Vector3<f64>, &SurfacePlace)> = places
             .iter()
             .filter_map(|point| {
@@ -126,15 +132,9 @@ impl SurfaceIndex {
             normal_matrix += row * row.transpose();
             right += row * normal.dot(&(vector(&partner.place) - place));
         }
-        let change = held_solution(normal_matrix, &right);
-        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(change[0], change[1], change[2]) / unit);
-        let shift = Vector3::new(change[3], change[4], change[5]);
-        let turned =
-            [0, 1, 2].map(|column| turn * Vector3::new(pose[0][column], pose[1][column], pose[2][column]));
-        let origin = Vector3::new(pose[0][3], pose[1][3], pose[2][3]);
-        let origin = turn * (origin - middle) + middle + shift;
-        let row = |k: usize| [turned[0][k], turned[1][k], turned[2][k], origin[k]];
-        Some([row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]])
+        let [x, y, z, translation @ ..] = <[f64; 6]>::from(held_solution(normal_matrix, &right));
+        let rotation_vector = [x, y, z].map(|angle| angle / unit);
+        Some(RigidTransform::about(middle.into(), rotation_vector, translation) * *pose)
     }
 }
 
@@ -151,12 +151,10 @@ fn held_solution(matrix: Matrix6<f64>, right: &Vector6<f64>) -> Vector6<f64> {
     solution
 }
 
-fn moved(pose: &Pose, point: &SurfacePlace) -> SurfacePlace {
-    let turned = |v: [f64; 3]| [0, 1, 2].map(|k| (0..3).map(|i| pose[k][i] * v[i]).sum::<f64>());
-    let (place, normal) = (turned(point.place.map(f64::from)), turned(point.normal.map(f64::from)));
+fn moved(pose: &RigidTransform, point: &SurfacePlace) -> SurfacePlace {
     SurfacePlace {
-        place: [0, 1, 2].map(|k| (place[k] + pose[k][3]) as f32),
-        normal: normal.map(|x| x as f32),
+        place: pose.transform_point(point.place.map(f64::from)).map(|x| x as f32),
+        normal: pose.transform_vector(point.normal.map(f64::from)).map(|x| x as f32),
     }
 }
 
@@ -195,12 +193,6 @@ mod tests {
         places
     }
 
-    fn posed(turn: [f64; 3], shift: [f64; 3]) -> Pose {
-        let turn = UnitQuaternion::from_scaled_axis(Vector3::from(turn)).to_rotation_matrix();
-        let row = |k: usize| [turn[(k, 0)], turn[(k, 1)], turn[(k, 2)], shift[k]];
-        [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
-    }
-
     #[test]
     fn the_nearest_place_is_that_of_a_search_through_all() {
         let places = box_places();
@@ -224,12 +216,13 @@ mod tests {
         let places = box_places();
         let index = SurfaceIndex::new(places.clone(), 2.0);
         let reaches: Vec<f32> = (0..12).map(|k| 4.0 * 0.9_f32.powi(k)).collect();
-        let starts = [posed([0.05, -0.04, 0.06], [0.8, -0.6, 0.5]), posed([0.0; 3], [100.0, 0.0, 0.0])];
+        let starts = [
+            RigidTransform::from_rotation_vector([0.05, -0.04, 0.06], [0.8, -0.6, 0.5]),
+            RigidTransform::from_rotation_vector([0.0; 3], [100.0, 0.0, 0.0]),
+        ];
         let found = index.settle_all(&starts, &places, &reaches);
-        for (row, wanted) in found[0].iter().zip(posed([0.0; 3], [0.0; 3])) {
-            for (a, b) in row.iter().zip(wanted) {
-                assert!((a - b).abs() < 1e-5, "{:?}", found[0]);
-            }
+        for difference in found[0].log() {
+            assert!(difference.abs() < 1e-5, "{:?}", found[0]);
         }
         assert_eq!(found[1], starts[1], "far from everything");
     }
@@ -239,13 +232,16 @@ mod tests {
         let plane: Vec<SurfacePlace> =
             box_places().into_iter().filter(|point| point.normal == [0.0, 0.0, 1.0]).collect();
         let index = SurfaceIndex::new(plane.clone(), 2.0);
-        let [found] = index.settle_all(&[posed([0.0, 0.0, 0.3], [0.7, -0.4, 0.5])], &plane, &[2.0; 4])[..]
-        else {
+        let [found] = index.settle_all(
+            &[RigidTransform::from_rotation_vector([0.0, 0.0, 0.3], [0.7, -0.4, 0.5])],
+            &plane,
+            &[2.0; 4],
+        )[..] else {
             panic!("one pose")
         };
-        let wanted = posed([0.0, 0.0, 0.3], [0.7, -0.4, 0.0]);
-        for (a, b) in found.iter().flatten().zip(wanted.iter().flatten()) {
-            assert!((a - b).abs() < 1e-6, "{found:?}");
+        let wanted = RigidTransform::from_rotation_vector([0.0, 0.0, 0.3], [0.7, -0.4, 0.0]);
+        for difference in (found * wanted.inverse()).log() {
+            assert!(difference.abs() < 1e-6, "{found:?}");
         }
     }
 }

@@ -12,6 +12,7 @@ from surfsig._surfsig import SurfacePlaces
 from surfsig.finding.model import Model
 from surfsig.finding.rim import Rim
 from surfsig.finding.scene import Surroundings
+from surfsig.geometry import rotate, transform_points
 
 Array = NDArray[np.float64]
 
@@ -106,8 +107,8 @@ class Witness:
         """Tell which places face the sensor in a pose; all where its place is not known."""
         if self.eye is None:
             return np.ones(len(self.places), np.bool_)
-        ways = self.eye - (self.places @ pose[:3, :3].T + pose[:3, 3])
-        along = np.einsum("ij,ij->i", self.normals @ pose[:3, :3].T, ways)
+        ways = self.eye - transform_points(pose, self.places)
+        along = np.einsum("ij,ij->i", rotate(pose, self.normals), ways)
         return np.asarray(along > _STEEP * np.linalg.norm(ways, axis=1))
 
     def _fits(self, pose: Array, touching: NDArray[np.bool_], partners: NDArray[np.int64]) -> float:
@@ -116,9 +117,9 @@ class Witness:
         if not len(on):
             return 0.0
         others = self.around.places[partners[on]], self.around.normals[partners[on]]
-        ways = others[0] - (self.places[on] @ pose[:3, :3].T + pose[:3, 3])
+        ways = others[0] - transform_points(pose, self.places[on])
         heights = np.einsum("ij,ij->i", ways, others[1]) / (_TOUCHING * self.around.voxel)
-        cosines = np.einsum("ij,ij->i", self.normals[on] @ pose[:3, :3].T, others[1])
+        cosines = np.einsum("ij,ij->i", rotate(pose, self.normals[on]), others[1])
         alike = np.maximum(1.0 - heights**2, 0.0) * np.maximum((cosines - _ALIKE) / (1.0 - _ALIKE), 0.0)
         low, high = _BY_CHANCE
         return float(np.clip((alike.mean() - low) / (high - low), 0.0, 1.0))

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from surfsig.alignment.free_directions import FreeDirection
+from surfsig.cloud_transforms import transform_cloud
 from surfsig.colors import GREY, distinct_colors
 from surfsig.digits import position_text
 from surfsig.point_cloud import PointCloud
-from surfsig.recurrences.free_directions import FreeDirection
-from surfsig.registration.motion import moved
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -140,7 +140,7 @@ class Instances:
         The model's finite points, in the scene's coordinates.
         """
         instance = self.instances[number]
-        return moved(self.models[instance.name], instance.T_scene_model)
+        return transform_cloud(instance.T_scene_model, self.models[instance.name])
 
     def write_report(self, path: str | Path, *, title: str = "Instances") -> None:
         """Write one HTML page: the scene before, and after with the models in colours, and a table.

@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from surfsig.arguments import positive_length
+from surfsig.cloud_transforms import about_zero
 from surfsig.curvature import extract
 from surfsig.errors import InvalidInputError
 from surfsig.field import FieldSignatures, field_signatures
+from surfsig.one_sided_normals import one_sided_normals
 from surfsig.orientation import orientation
 from surfsig.point_cloud import PointCloud
-from surfsig.registration.motion import about_zero
-from surfsig.registration.sides import one_sided_normals
 from surfsig.spacing import point_spacing
 from surfsig.visibility import seen_from
 

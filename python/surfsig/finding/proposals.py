@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from surfsig.field import FieldSignatures, match_fields
+from surfsig.geometry import inverse
 
 Array = NDArray[np.float64]
 
@@ -36,12 +37,12 @@ def proposed_poses(model: FieldSignatures, scene: FieldSignatures, most: int) ->
     found = match_fields(scene, model, mutual=False)
     if not len(found):
         return np.empty((0, 4, 4))
-    turns = found.poses[:, :3, :3].swapaxes(1, 2)
-    middles = -np.einsum("nij,nj->ni", turns, found.poses[:, :3, 3])
+    proposed = inverse(found.poses)
+    middles = proposed[:, :3, 3]
     alike = np.maximum(1.0 - found.distances.astype(np.float64) ** 2 / 2.0, 0.0)
     alike /= np.bincount(found.target, minlength=len(model))[found.target]
     # A unit quaternion and its negative are one turn; two are half the angle between them apart.
-    quaternions = Rotation.from_matrix(turns).as_quat()
+    quaternions = Rotation.from_matrix(proposed[:, :3, :3]).as_quat()
     scaled = np.hstack([middles / (_NEAR * model.radius), quaternions / (0.5 * _TURN)])
     both = np.concatenate([scaled, scaled * ([1.0] * 3 + [-1.0] * 4)])
     tree = cKDTree(both)

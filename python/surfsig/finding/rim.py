@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from surfsig._surfsig import SurfacePlaces
 from surfsig.finding.model import Model
 from surfsig.finding.scene import Surroundings
+from surfsig.geometry import axes_across, rotate, transform_points
 
 Array = NDArray[np.float64]
 
@@ -37,9 +38,7 @@ class Rim:
     def __init__(self, model: Model, places: Array, normals: Array, voxel: float) -> None:
         """Step from places (n, 3) with normals (n, 3), which are some of the model's."""
         turns = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
-        across = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
-        across /= np.linalg.norm(across, axis=1, keepdims=True)
-        along = np.cross(normals, across)
+        across, along = axes_across(normals)
         steps = np.cos(turns)[:, None, None] * across + np.sin(turns)[:, None, None] * along
         beside = (places + _STEP * voxel * steps).reshape(-1, 3)
         clear = cKDTree(model.points).query(beside, distance_upper_bound=_CLEAR * voxel)[0] > _CLEAR * voxel
@@ -64,8 +63,8 @@ class Rim:
             return 1.0
         partners = around.index.partners(pose[None], self._surface, _NEAR * around.voxel)[0]
         on = np.flatnonzero(asked & (partners >= 0) & free[partners])
-        places = self._places[on] @ pose[:3, :3].T + pose[:3, 3]
-        normals = self._normals[on] @ pose[:3, :3].T
+        places = transform_points(pose, self._places[on])
+        normals = rotate(pose, self._normals[on])
         heights = np.einsum("ij,ij->i", around.places[partners[on]] - places, normals)
         share = float((np.abs(heights) < _HEIGHT * around.voxel).sum()) / float(asked.sum())
         return max(0.0, 1.0 - share / self._too_much)

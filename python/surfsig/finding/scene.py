@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from surfsig._surfsig import DepthImage, SurfaceIndex, SurfacePlaces
+from surfsig.cloud_transforms import about_zero
 from surfsig.field import FieldSignatures, field_signatures
 from surfsig.finding.model import PLACES, sides_of, surface_places
 from surfsig.missing_returns import missing_returns
 from surfsig.point_cloud import PointCloud
-from surfsig.registration.motion import about_zero
 from surfsig.spacing import point_spacing
 from surfsig.visibility import seen_from
 

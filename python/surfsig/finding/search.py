@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
+from surfsig.alignment.contact import Surface, contact, spread
+from surfsig.alignment.free_directions import free_directions
 from surfsig.arguments import thread_count
 from surfsig.defaults import INSTANCE_SCORE
 from surfsig.errors import InvalidInputError
@@ -19,12 +20,9 @@ from surfsig.finding.library import Library
 from surfsig.finding.model import FEWEST, SPACINGS, Model, model_of
 from surfsig.finding.proposals import proposed_poses
 from surfsig.finding.scene import Scene
+from surfsig.geometry import from_translation, inverse, rotate, rotation_angle, transform_points
 from surfsig.missing_returns import missing_returns, missing_returns_text
 from surfsig.point_cloud import PointCloud
-from surfsig.recurrences.alignment import inverse
-from surfsig.recurrences.free_directions import free_directions
-from surfsig.registration.contact import Surface, contact, spread
-from surfsig.registration.motion import shifted
 from surfsig.resolution import warn_if_too_coarse
 from surfsig.units import ratio_text
 
@@ -60,7 +58,7 @@ class _Candidate:
 
     def near(self, places: Array) -> NDArray[np.bool_]:
         """Tell which places (n, 3) of the scene are at the model's surface."""
-        local = (places - self.pose[:3, 3]) @ self.pose[:3, :3]
+        local = transform_points(inverse(self.pose), places)
         reach = _OWN * self.witness.around.voxel
         within = np.flatnonzero(np.linalg.norm(local, axis=1) < self.model.extent + reach)
         near = np.zeros(len(places), np.bool_)
@@ -196,7 +194,7 @@ def _different(poses: Array, radius: float) -> list[Array]:
     for pose in poses:
         for other in kept:
             near = np.linalg.norm(pose[:3, 3] - other[:3, 3]) < _SAME_MIDDLE * radius
-            if near and Rotation.from_matrix(pose[:3, :3].T @ other[:3, :3]).magnitude() < _SAME_TURN:
+            if near and rotation_angle(inverse(pose) @ other) < _SAME_TURN:
                 break
         else:
             kept.append(pose)
@@ -248,10 +246,10 @@ def _instance(candidate: _Candidate, scene: Scene, taken: NDArray[np.bool_]) -> 
     taken |= own
     # A small motion of the scene in the model's axes is the opposite one of the model in the scene's.
     turn = np.kron(np.eye(2), pose[:3, :3])
-    center = pose[:3, :3] @ fitted.center + pose[:3, 3]
+    center = transform_points(pose, fitted.center)
     return Instance(
         name=candidate.name,
-        T_scene_model=shifted(scene.middle) @ pose @ shifted(-model.middle),
+        T_scene_model=from_translation(scene.middle) @ pose @ from_translation(-model.middle),
         covariance=turn @ fitted.covariance @ turn.T,
         center=center + scene.middle,
         score=evidence.score,
@@ -259,7 +257,7 @@ def _instance(candidate: _Candidate, scene: Scene, taken: NDArray[np.bool_]) -> 
         overlap=evidence.overlap,
         rms=fitted.rms,
         free_directions=free_directions(
-            fitted.places @ pose[:3, :3].T + pose[:3, 3] + scene.middle, fitted.normals @ pose[:3, :3].T
+            transform_points(pose, fitted.places) + scene.middle, rotate(pose, fitted.normals)
         ),
         indices=scene.numbers[own],
     )

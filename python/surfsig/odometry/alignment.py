@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.alignment.blocks import blocks, clustered_covariance
+from surfsig.alignment.refinement import gicp
 from surfsig.clean import downsample
+from surfsig.geometry import from_rotation_vector, inverse, orthonormal, transform_points
 from surfsig.odometry.local_map import LocalMap, prepared
-from surfsig.odometry.motion import moved, orthonormal, small
 from surfsig.odometry.panorama import Panorama
 from surfsig.point_cloud import PointCloud
-from surfsig.recurrences.alignment import inverse
-from surfsig.registration.blocks import blocks, clustered_covariance
-from surfsig.registration.refinement import gicp
 
 Array = NDArray[np.float64]
 Known = Callable[[Array, Array], NDArray[np.bool_]]
@@ -106,7 +105,7 @@ def align(
         if partners < _FEWEST:
             return None
     for step in range(_LAST_STEPS + 1):
-        places = moved(pose, scan.points)
+        places = transform_points(pose, scan.points)
         numbers, squares = tree.batch_nearest_neighbor_search(places)
         nearest = np.asarray(numbers)
         near = np.asarray(squares) < _NEAR**2
@@ -120,7 +119,7 @@ def align(
         design = np.hstack([np.cross(scan.points[on], own), own])
         if step < _LAST_STEPS:
             change = -np.linalg.lstsq(design.T @ design, design.T @ heights[on], rcond=1e-9)[0]
-            pose = orthonormal(pose @ small(change))
+            pose = orthonormal(pose @ from_rotation_vector(change[:3], change[3:]))
     # Not all that the map has is on its surface, by noise and at edges.
     explained = (near & (np.abs(heights) < _ON)) | (np.asarray(squares) < _BESIDE**2)
     known = should_be_known(pose, scan.points)
@@ -128,7 +127,7 @@ def align(
         pose,
         _covariance(design, heights[on], scan.points[on]),
         float(on.mean()),
-        scan.panorama.seen_through(moved(inverse(pose), around.points)),
+        scan.panorama.seen_through(transform_points(inverse(pose), around.points)),
         float((known & ~explained).sum() / max(1, known.sum())),
         _is_held(design),
         around.scans[nearest[on]],

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.alignment.consensus import Pairs, agreed_pose
 from surfsig.field import FieldSignatures, keypoints, match_fields
+from surfsig.geometry import inverse, rotation_angle, transform_points
 from surfsig.odometry.alignment import Alignment, Scan, align
 from surfsig.odometry.local_map import LocalMap
-from surfsig.odometry.motion import moved, turned_by
 from surfsig.odometry.panorama import Panorama
 from surfsig.point_cloud import PointCloud
-from surfsig.recurrences.alignment import inverse
-from surfsig.registration.consensus import Pairs, agreed_pose
 
 Array = NDArray[np.float64]
 
@@ -63,7 +62,7 @@ class Keyframes:
         for other in reversed(self._kept):
             between = to_scan @ other.pose
             near = float(np.linalg.norm(between[:3, 3])) < _APART * self._reach
-            if near and turned_by(between) < _TURNED:
+            if near and rotation_angle(between) < _TURNED:
                 return
         points, detail = scan.points.astype(np.float32), scan.detail().astype(np.float32)
         self._kept.append(Keyframe(number, pose, points, detail, scan.panorama))
@@ -73,7 +72,9 @@ class Keyframes:
         result = LocalMap(self._threads)
         for keyframe in self._kept:
             if np.linalg.norm(keyframe.pose[:3, 3] - center) <= distance:
-                result.add(moved(keyframe.pose, keyframe.points.astype(np.float64)), keyframe.number)
+                result.add(
+                    transform_points(keyframe.pose, keyframe.points.astype(np.float64)), keyframe.number
+                )
         result.keep_within(center, distance)
         return result
 
@@ -90,7 +91,7 @@ class Keyframes:
         near = sorted(self._kept, key=lambda other: float(np.linalg.norm(other.pose[:3, 3] - pose[:3, 3])))
         known = np.zeros(len(points), bool)
         for keyframe in near[:_WITNESSES]:
-            known |= keyframe.panorama.covers(moved(inverse(keyframe.pose) @ pose, points))
+            known |= keyframe.panorama.covers(transform_points(inverse(keyframe.pose) @ pose, points))
         return known
 
     def find(

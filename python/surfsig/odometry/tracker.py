@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.geometry import adjoint, inverse, rotation_angle, transform_points
 from surfsig.odometry.alignment import Alignment, Scan, align
 from surfsig.odometry.keyframes import Keyframes
 from surfsig.odometry.local_map import LocalMap
-from surfsig.odometry.motion import adjoint, moved, turned_by
 from surfsig.odometry.result import ScanStatus
 from surfsig.odometry.usual import Usual
-from surfsig.recurrences.alignment import inverse
 
 Array = NDArray[np.float64]
 
@@ -132,7 +131,7 @@ class Tracker:
 
     def _at_reach(self, off: Array) -> float:
         """Give how far a motion carries what is at the median distance, at most."""
-        turned = 2.0 * self._reach * math.sin(0.5 * turned_by(off))
+        turned = 2.0 * self._reach * math.sin(0.5 * rotation_angle(off))
         return turned + float(np.linalg.norm(off[:3, 3]))
 
     def _aligned(self, scan: Scan, prediction: Array) -> Alignment | None:
@@ -188,7 +187,7 @@ class Tracker:
             self._last_mapped = None
         pose = step.pose
         if self._is_new(pose):
-            self._map.add(moved(pose, scan.points), self._number)
+            self._map.add(transform_points(pose, scan.points), self._number)
             self._map.keep_within(pose[:3, 3], self._range)
             self._mapped[self._number] = pose, step.covariance
             self._keyframes.offer(scan, pose, self._number)
@@ -210,4 +209,4 @@ class Tracker:
         if self._last_mapped is None:
             return True
         since = inverse(self._last_mapped) @ pose
-        return float(np.linalg.norm(since[:3, 3])) > _MAPPED_MOVE or turned_by(since) > _MAPPED_TURN
+        return float(np.linalg.norm(since[:3, 3])) > _MAPPED_MOVE or rotation_angle(since) > _MAPPED_TURN

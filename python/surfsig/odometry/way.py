@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from surfsig.clean import COORDINATE_LIMIT
 from surfsig.files.sequence import TimedScan
+from surfsig.geometry import adjoint, from_translation, rotate
 from surfsig.missing_returns import remove_missing_returns
 from surfsig.odometry.alignment import Scan
-from surfsig.odometry.motion import adjoint
 from surfsig.odometry.result import Odometry, ScanStatus
 from surfsig.odometry.scale import FEWEST, Scale
 from surfsig.odometry.tracker import Step, Tracker
@@ -71,10 +71,8 @@ class Way:
     def _in_frames(self, step: Step, sensor: Array, voxel: float) -> Placed:
         """Take a step from places about the sensor, in voxels, to the scan's own frame and the world's."""
         pose = step.pose.copy()
-        pose[:3, 3] = voxel * pose[:3, 3] + self._sensors[self._first] - pose[:3, :3] @ sensor
-        to_sensor = np.eye(4)
-        to_sensor[:3, 3] = sensor
-        carried = adjoint(to_sensor) * np.repeat([1.0, voxel], 3)
+        pose[:3, 3] = voxel * pose[:3, 3] + self._sensors[self._first] - rotate(pose, sensor)
+        carried = adjoint(from_translation(sensor)) * np.repeat([1.0, voxel], 3)
         return pose, carried @ step.covariance @ carried.T, step.status, step.overlap
 
     def _about_sensor(self, cloud: PointCloud) -> tuple[Array, Array]:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from surfsig.geometry import from_rotation_vector, inverse, rotate, transform_points
 from surfsig.recurrences.point_pairs import proposed_poses
 from surfsig.recurrences.view import View
 
@@ -100,15 +100,6 @@ def _shares(poses: Array, views: tuple[View, View], most: int, looseness: float)
     return np.moveaxis(np.asarray(sides, np.float64), 2, 0)
 
 
-def inverse(poses: Array) -> Array:
-    """Invert poses (..., 4, 4)."""
-    back = np.zeros_like(poses)
-    back[..., :3, :3] = poses[..., :3, :3].swapaxes(-1, -2)
-    back[..., :3, 3] = -np.einsum("...ij,...j->...i", back[..., :3, :3], poses[..., :3, 3])
-    back[..., 3, 3] = 1.0
-    return back
-
-
 def _agreement(shares: Array, penalties: tuple[float, float]) -> Array:
     confirmed, contradicted, astray, missing = shares
     wrong = penalties[0] * contradicted + penalties[1] * missing + astray
@@ -138,10 +129,10 @@ def _best(poses: Array, score: Array, most: int) -> tuple[Array, Array]:
 def _mutated(poses: Array, target: View, step: float, rng: np.random.Generator) -> Array:
     """Give the poses, and each turned about the target's middle and shifted at random."""
     count = len(poses) * _MUTATIONS
-    motion = np.tile(np.eye(4), (count, 1, 1))
-    motion[:, :3, :3] = Rotation.from_rotvec(rng.normal(0.0, _TURN * step, (count, 3))).as_matrix()
-    motion[:, :3, 3] = rng.normal(0.0, _SHIFT * step * target.extent, (count, 3))
-    return np.concatenate([poses, motion @ np.repeat(poses, _MUTATIONS, axis=0)])
+    rotation_vectors = rng.normal(0.0, _TURN * step, (count, 3))
+    translations = rng.normal(0.0, _SHIFT * step * target.extent, (count, 3))
+    changes = from_rotation_vector(rotation_vectors, translations)
+    return np.concatenate([poses, changes @ np.repeat(poses, _MUTATIONS, axis=0)])
 
 
 def _settled(pose: Array, views: tuple[View, View], most: int) -> Array:
@@ -152,27 +143,23 @@ def _settled(pose: Array, views: tuple[View, View], most: int) -> Array:
     """
     source, target = views
     for _ in range(_SETTLING):
-        turn, shift = pose[:3, :3], pose[:3, 3]
         kept, foot, normal = target.image.correspondences(pose, source.surface, most, target.tolerance)
-        moved = source.points[kept] @ turn.T + shift
+        moved = transform_points(pose, source.points[kept])
         rows = [_row(moved / target.extent, normal)]
         heights = [np.einsum("ij,ij->i", moved - foot, normal)]
         back = inverse(pose)
         kept, foot, normal = source.image.correspondences(back, target.surface, most, source.tolerance)
-        normal = normal @ turn.T
+        normal = rotate(pose, normal)
         # The target's point stays and the source's surface moves: the opposite sign.
         rows.append(_row(target.points[kept] / target.extent, normal))
-        heights.append(np.einsum("ij,ij->i", foot @ turn.T + shift - target.points[kept], normal))
+        heights.append(np.einsum("ij,ij->i", transform_points(pose, foot) - target.points[kept], normal))
         design, height = np.concatenate(rows), np.concatenate(heights)
         if len(design) < 6:
             break
         values, vectors = np.linalg.eigh(design.T @ design)
         inverted = np.where(values > _FREE**2 * values[-1], 1.0 / np.maximum(values, 1e-300), 0.0)
         change = -vectors @ (inverted * (vectors.T @ (design.T @ height)))
-        motion = np.eye(4)
-        motion[:3, :3] = Rotation.from_rotvec(change[:3] / target.extent).as_matrix()
-        motion[:3, 3] = change[3:]
-        pose = motion @ pose
+        pose = from_rotation_vector(change[:3] / target.extent, change[3:]) @ pose
     return pose
 
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from surfsig.recurrences.free_directions import FreeDirection, free_directions_of_surface
+from surfsig.alignment.free_directions import FreeDirection, free_directions_of_surface
+from surfsig.geometry import axes_across, from_rotation_vector, transform_points
 
 if TYPE_CHECKING:
     from surfsig.surfaces import Surface, Surfaces
@@ -133,15 +133,13 @@ def _motion(first: Surface, other: Surface) -> Array:
     if first.kind != "sphere":
         # A cone's axis has a direction; the others' do not.
         sign = 1.0 if first.kind == "cone" or float(first.axis @ other.axis) >= 0.0 else -1.0
-        across = np.cross(first.axis, np.eye(3)[np.abs(first.axis).argmin()])
         target = sign * other.axis
         angle = float(np.arccos(np.clip(first.axis @ target, -1.0, 1.0)))
         way = np.cross(first.axis, target)
         size = float(np.linalg.norm(way))
-        way = way / size if size > 0.0 else across / np.linalg.norm(across)
-        pose[:3, :3] = Rotation.from_rotvec(angle * way).as_matrix()
-    start, end = _place(first), _place(other)
-    pose[:3, 3] = end - pose[:3, :3] @ start
+        way = way / size if size > 0.0 else axes_across(first.axis)[0]
+        pose = from_rotation_vector(angle * way, np.zeros(3))
+    pose[:3, 3] = _place(other) - transform_points(pose, _place(first))
     return pose
 
 

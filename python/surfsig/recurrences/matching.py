@@ -8,7 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from surfsig.recurrences.alignment import Alignment, align, inverse, measured, refined
+from surfsig.geometry import inverse
+from surfsig.recurrences.alignment import Alignment, align, measured, refined
 from surfsig.recurrences.grouping import ways_from_first
 from surfsig.recurrences.main_surface import may_be_equal
 from surfsig.recurrences.view import View

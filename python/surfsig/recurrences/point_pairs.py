@@ -11,10 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from surfsig.geometry import inverse
+
 Array = NDArray[np.float64]
 
 _NEAREST = 16
 _ALIKE = 4
+_ALONG = 1e-3
+"""Radians between the line from point to point and the first normal, below which a pair has no axes."""
 _TOLERANCE = 0.35
 """Of features: radians, or parts of the unit of length."""
 
@@ -38,11 +42,14 @@ def pair_features(
 
 
 def frames_of(points: Array, normals: Array, first: NDArray[np.int64], second: NDArray[np.int64]) -> Array:
-    """Give the pairs' own axes as poses (m, 4, 4): z the first normal, x towards the second point."""
-    z = normals[first]
+    """Give the pairs' own axes as poses (m, 4, 4): z the first normal, x towards the second point.
+
+    No line between the points may be along the first normal.
+    """
+    z = normals[first] / np.linalg.norm(normals[first], axis=1, keepdims=True)
     line = points[second] - points[first]
     x = line - np.einsum("ij,ij->i", line, z)[:, None] * z
-    x /= np.maximum(np.linalg.norm(x, axis=1), np.finfo(float).tiny)[:, None]
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
     poses = np.tile(np.eye(4), (len(first), 1, 1))
     poses[:, :3, 0], poses[:, :3, 1], poses[:, :3, 2] = x, np.cross(z, x), z
     poses[:, :3, 3] = points[first]
@@ -86,6 +93,8 @@ def proposed_poses(source: PointPairs, target: PointPairs, most: int, rng: np.ra
     found = match < len(target.first)
     row = chosen[np.nonzero(found)[0]]
     column = match[found]
+    across = np.minimum(np.sin(source.features[row, 1]), np.sin(target.features[column, 1])) > _ALONG
+    row, column = row[across], column[across]
     moving = frames_of(source.points, source.normals, source.first[row], source.second[row])
     still = frames_of(target.points, target.normals, target.first[column], target.second[column])
-    return np.asarray(still @ np.linalg.inv(moving))
+    return still @ inverse(moving)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.alignment.free_directions import FreeDirection
 from surfsig.recurrences.equal_surfaces import EqualSurfaces
-from surfsig.recurrences.free_directions import FreeDirection
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.alignment.free_directions import free_directions
 from surfsig.arguments import whole_number
 from surfsig.defaults import (
     RECURRENCE_CONFIDENCE,
@@ -15,8 +16,8 @@ from surfsig.defaults import (
     RECURRENCE_SEED,
 )
 from surfsig.errors import InvalidInputError
+from surfsig.geometry import rotate
 from surfsig.recurrences.equal_surfaces import equal_surfaces
-from surfsig.recurrences.free_directions import free_directions
 from surfsig.recurrences.grouping import groups_of, ways_from_first
 from surfsig.recurrences.main_surface import main_surface
 from surfsig.recurrences.matching import Pairs, agreement_of, matched_pairs, poses_from, scores_of
@@ -120,7 +121,7 @@ def _recurrence(
     score = {end: float(scores[start, end]) for start, end in ways_from_first(members, scores)}
     score[members[0]] = 1.0
     for member in members:
-        pose[member][:3, 3] += middles[member] - pose[member][:3, :3] @ middles[members[0]]
+        pose[member][:3, 3] += middles[member] - rotate(pose[member], middles[members[0]])
     free = free_directions(*smooth)
     return Recurrence(
         members,

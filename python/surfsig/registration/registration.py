@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surfsig.alignment.free_directions import FreeDirection
+from surfsig.cloud_transforms import transform_cloud
 from surfsig.digits import position_text
+from surfsig.geometry import transform_points
 from surfsig.point_cloud import PointCloud, coordinate_array
-from surfsig.recurrences.free_directions import FreeDirection
-from surfsig.registration.motion import moved
 
 Array = NDArray[np.float64]
 
@@ -76,9 +77,7 @@ class Registration:
         InvalidInputError
             If they are no points.
         """
-        places = coordinate_array(points, "points").astype(np.float64)
-        rotation, shift = self.T_target_source[:3, :3], self.T_target_source[:3, 3]
-        return np.asarray(places @ rotation.T + shift)
+        return transform_points(self.T_target_source, coordinate_array(points, "points").astype(np.float64))
 
     def moved(self, cloud: PointCloud) -> PointCloud:
         """Move a cloud of the source into the target, its viewpoint and normals with it.
@@ -92,7 +91,7 @@ class Registration:
         -------
         A cloud of its own, with all fields.
         """
-        return moved(cloud, self.T_target_source)
+        return transform_cloud(self.T_target_source, cloud)
 
     def rows(self) -> list[tuple[str, str]]:
         """Describe the result for people.

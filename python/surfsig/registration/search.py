@@ -7,20 +7,20 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surfsig.alignment.consensus import Pairs, agreed_pose
+from surfsig.alignment.contact import Contact, Surface, contact, spread
+from surfsig.alignment.free_directions import free_directions
+from surfsig.alignment.refinement import Refiner
 from surfsig.arguments import positive_length, thread_count, whole_number
+from surfsig.cloud_transforms import about_zero
 from surfsig.defaults import REGISTRATION_KEYPOINTS
-from surfsig.errors import InvalidInputError
 from surfsig.field import FieldSignatures, keypoints, match_fields
+from surfsig.geometry import from_translation, pose_array
 from surfsig.missing_returns import without_missing_returns
+from surfsig.one_sided_normals import one_sided_normals
 from surfsig.orientation import orientation
 from surfsig.point_cloud import PointCloud
-from surfsig.recurrences.free_directions import free_directions
-from surfsig.registration.consensus import Pairs, agreed_pose
-from surfsig.registration.contact import Contact, Surface, contact, spread
-from surfsig.registration.motion import about_zero, shifted
-from surfsig.registration.refinement import Refiner
 from surfsig.registration.registration import Registration
-from surfsig.registration.sides import one_sided_normals
 from surfsig.resolution import warn_if_too_coarse
 from surfsig.units import unit_mismatch
 
@@ -95,7 +95,7 @@ def register(
         without_missing_returns(PointCloud.of(cloud), name)
         for cloud, name in ((source, "source"), (target, "target"))
     ]
-    start = None if init is None else _pose(init)
+    start = None if init is None else pose_array(init, "init")
     most = whole_number(count, "count", 2**32 - 1)
     if radius is not None:
         radius = positive_length(radius, "radius")
@@ -125,7 +125,7 @@ def _registered(
         return _nothing(size)
     pairs = None
     if start is not None:
-        pose = shifted(-from_theirs) @ start @ shifted(from_ours)
+        pose = from_translation(-from_theirs) @ start @ from_translation(from_ours)
     else:
         pairs = _matched(ours, theirs, size, most, threads)
         if len(pairs) < 3:
@@ -144,7 +144,7 @@ def _registered(
     free = free_directions(found.places + from_theirs, found.normals)
     inliers = 0 if pairs is None else int(pairs.agreeing(found.pose).sum())
     return Registration(
-        T_target_source=shifted(from_theirs) @ found.pose @ shifted(-from_ours),
+        T_target_source=from_translation(from_theirs) @ found.pose @ from_translation(-from_ours),
         covariance=found.covariance,
         center=found.center + from_theirs,
         free_directions=free,
@@ -185,22 +185,6 @@ def _matched(source: PointCloud, target: PointCloud, radius: float, count: int, 
 def _knows_its_side(cloud: PointCloud) -> bool:
     viewpoint, normals = orientation(cloud, None, None, np.arange(0))
     return viewpoint is not None or normals is not None
-
-
-def _pose(init: ArrayLike) -> Array:
-    """Check a pose that somebody gives."""
-    try:
-        pose = np.asarray(init, np.float64)
-    except (TypeError, ValueError):
-        raise InvalidInputError("init must be a pose T_target_source, (4, 4)") from None
-    if pose.shape != (4, 4) or not np.isfinite(pose).all():
-        raise InvalidInputError("init must be a finite pose T_target_source, (4, 4)")
-    turned = pose[:3, :3] @ pose[:3, :3].T
-    if not (np.allclose(turned, np.eye(3), atol=1e-4) and np.linalg.det(pose[:3, :3]) > 0):
-        raise InvalidInputError("init must turn and shift, not scale or mirror")
-    if not np.allclose(pose[3], [0, 0, 0, 1]):
-        raise InvalidInputError("init must have 0, 0, 0, 1 in its last row")
-    return pose
 
 
 def _nothing(radius: float, matches: int = 0) -> Registration:

@@ -11,11 +11,12 @@ Metres throughout; heights grow along negative z (:mod:`surfsig.simulate.scanner
 >>> cloud = simulate.Scanner(noise=5e-5).scan(simulate.Scene([ball, table]), seed=1)
 """
 
+from ..geometry import inverse, transform_points
 from .acquisitions import RANDOM_TILT, Acquisition, Jitter, paper_acquisition, paper_acquisitions
 from .ellipsoid import Ellipsoid
 from .height_field import HeightField
 from .part import PART_SCANNER, part, part_scene
-from .poses import UP, facing, inverse, pose, transform, turn
+from .poses import UP, facing, pose, turn
 from .scanner import Scanner
 from .scene import Hits, Placed, Scene
 from .surfaces import Box, Cone, Cylinder, Plane, Rectangle, Sphere, Surface
@@ -46,6 +47,6 @@ __all__ = [
     "part",
     "part_scene",
     "pose",
-    "transform",
+    "transform_points",
     "turn",
 ]

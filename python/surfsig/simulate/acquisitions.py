@@ -33,9 +33,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from ..errors import InvalidInputError
+from ..geometry import transform_points
 from ..point_cloud import PointCloud
 from .height_field import HeightField
-from .poses import UP, Array, facing, pose, transform, turn, unit
+from .poses import UP, Array, facing, pose, turn, unit
 from .scanner import Scanner
 from .scene import Placed, Scene
 from .surfaces import Cylinder, Rectangle, Sphere, Surface
@@ -288,7 +289,7 @@ def _jittered(scene: Scene, stated: Array, rng: np.random.Generator, jitter: Jit
     motion = pose(stated + shift - rotation @ stated, rotation)
     moved = [placed.moved(motion) for placed in scene.objects[:-1]]
     missed = np.append(rng.uniform(-jitter.pick, jitter.pick, 2), 0.0)
-    return Scene([*moved, scene.objects[-1]]), transform(motion, stated) + missed
+    return Scene([*moved, scene.objects[-1]]), transform_points(motion, stated) + missed
 
 
 def _random_scene(row: _Row, rng: np.random.Generator) -> tuple[Scene, Array]:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InvalidInputError
+from ..geometry import pose_array, skew
 
 Array = npt.NDArray[np.float64]
 
@@ -57,8 +58,7 @@ def turn(axis: Sequence[float] | Array, angle: float) -> Array:
     -------
     (3, 3) ndarray
     """
-    x, y, z = unit(axis)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    cross = skew(unit(axis))
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross))
 
 
@@ -102,61 +102,4 @@ def pose(position: Sequence[float] | Array, rotation: Array | None = None) -> Ar
     matrix[:3, 3] = position
     if rotation is not None:
         matrix[:3, :3] = rotation
-    return check_pose(matrix)
-
-
-def check_pose(matrix: Array) -> Array:
-    """Return the matrix as float64 if it is a rigid pose.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is not 4 x 4, finite, with a rotation (no mirror, no scale) and a last row 0 0 0 1.
-    """
-    matrix = np.asarray(matrix, dtype=np.float64)
-    if (
-        matrix.shape != (4, 4)
-        or not np.isfinite(matrix).all()
-        or not np.allclose(matrix[:3, :3].T @ matrix[:3, :3], np.eye(3), atol=1e-9)
-        or np.linalg.det(matrix[:3, :3]) < 0.0
-        or (matrix[3] != (0.0, 0.0, 0.0, 1.0)).any()
-    ):
-        raise InvalidInputError("a pose is a 4 x 4 matrix of a rotation and a translation, last row 0 0 0 1")
-    return matrix
-
-
-def transform(matrix: Array, points: Array) -> Array:
-    """Map points by a pose.
-
-    Parameters
-    ----------
-    matrix : (4, 4) ndarray
-        T_target_source.
-    points : (n, 3) or (3,) ndarray
-        In source coordinates.
-
-    Returns
-    -------
-    ndarray
-        The same shape, in target coordinates.
-    """
-    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
-
-
-def inverse(matrix: Array) -> Array:
-    """Inverse of a pose, exact in its rotation.
-
-    Parameters
-    ----------
-    matrix : (4, 4) ndarray
-        T_target_source.
-
-    Returns
-    -------
-    (4, 4) ndarray
-        T_source_target.
-    """
-    result = np.eye(4)
-    result[:3, :3] = matrix[:3, :3].T
-    result[:3, 3] = -matrix[:3, :3].T @ matrix[:3, 3]
-    return result
+    return pose_array(matrix, "pose")

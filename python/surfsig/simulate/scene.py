@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InvalidInputError
+from ..geometry import inverse, pose_array, rotate, transform_points
 from .height_field import HeightField
-from .poses import Array, check_pose, inverse, transform
+from .poses import Array
 from .surfaces import Surface
 
 # Points within a nanometre of a cutting solid's surface belong to both sides, so that no ray slips through
@@ -43,7 +44,7 @@ class Placed:
     outside: tuple[Placed, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pose", check_pose(self.pose))
+        object.__setattr__(self, "pose", pose_array(self.pose, "pose"))
         if isinstance(self.surface, HeightField) and (self.inside or self.outside):
             raise InvalidInputError(
                 "a HeightField cannot be cut: only its first crossing with a ray is known"
@@ -60,7 +61,7 @@ class Placed:
 
     def implicit(self, points: Array) -> Array:
         """Evaluate the implicit function, (n,), at points of the scene, (n, 3); cuts do not change it."""
-        return self.surface.implicit(transform(inverse(self.pose), points))
+        return self.surface.implicit(transform_points(inverse(self.pose), points))
 
     def contains(self, points: Array) -> npt.NDArray[np.bool_]:
         """Tell which points of the scene, (n, 3), the cuts leave; to within a nanometre."""
@@ -74,7 +75,7 @@ class Placed:
     def crossings(self, origins: Array, directions: Array) -> Array:
         """Ray parameters (k, n) in the scene, infinite where there is none; see :meth:`Surface.crossings`."""
         to_object = inverse(self.pose)
-        result = self.surface.crossings(transform(to_object, origins), directions @ to_object[:3, :3].T)
+        result = self.surface.crossings(transform_points(to_object, origins), rotate(to_object, directions))
         if self.inside or self.outside:
             for t in result:
                 ray = np.flatnonzero(np.isfinite(t))
@@ -160,8 +161,8 @@ class Scene:
         for index, placed in enumerate(self.objects):
             ray = np.flatnonzero(surface == index)
             points[ray] = origins[ray] + nearest[ray, None] * directions[ray]
-            own = transform(inverse(placed.pose), points[ray])
-            normals[ray] = placed.surface.normals(own) @ placed.pose[:3, :3].T
+            own = transform_points(inverse(placed.pose), points[ray])
+            normals[ray] = rotate(placed.pose, placed.surface.normals(own))
             curvatures[ray] = placed.surface.curvatures(own)
         behind = np.einsum("ij,ij->i", normals, directions) > 0.0
         normals[behind] *= -1.0

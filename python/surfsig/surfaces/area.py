@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from surfsig.surfaces.geometry import Array, Placement, across, middle_direction
+from surfsig.geometry import axes_across
+from surfsig.surfaces.geometry import Array, Placement, middle_direction
 
 _POINTS = 20_000
 """Points that are looked at; of more, evenly chosen ones."""
@@ -50,7 +51,7 @@ def covered_area(placement: Placement, points: Array) -> float:
 def unrolled(placement: Placement, points: Array) -> Array:
     """Give the points' places (n, 2) in a plane, on a map of the surface that keeps areas."""
     if placement.kind == "plane":
-        return points @ np.column_stack(across(placement.axis))
+        return points @ np.column_stack(axes_across(placement.axis))
     if placement.kind == "sphere":
         return _lambert(placement.radius, points)
     turns = _cut(placement.turns(points))
@@ -71,7 +72,7 @@ def _lambert(radius: float, points: Array) -> Array:
     """Map a sphere about the middle of its points (Lambert's azimuthal map)."""
     towards = points / np.linalg.norm(points, axis=1, keepdims=True)
     middle = middle_direction(towards)
-    flat = towards @ np.column_stack(across(middle))
+    flat = towards @ np.column_stack(axes_across(middle))
     scale = np.sqrt(2 / np.maximum(1 + towards @ middle, 1e-9))
     mapped: Array = radius * flat * scale[:, None]
     return mapped

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.geometry import axes_across
+
 Array = NDArray[np.float64]
 
 
@@ -52,15 +54,8 @@ class Placement:
 
     def turns(self, points: Array) -> Array:
         """Give angles about the axis."""
-        first, second = across(self.axis)
+        first, second = axes_across(self.axis)
         return np.arctan2(points @ second, points @ first)
-
-
-def across(axis: Array) -> tuple[Array, Array]:
-    """Give two unit vectors that make a right-handed system with an axis."""
-    first = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
-    first /= np.linalg.norm(first)
-    return first, np.cross(axis, first)
 
 
 def covered_arc(placement: Placement, points: Array) -> float:
@@ -89,7 +84,7 @@ def in_plane(placement: Placement, points: Array) -> tuple[float, float]:
     """
     from scipy.spatial import ConvexHull
 
-    flat = points @ np.column_stack(across(placement.axis))
+    flat = points @ np.column_stack(axes_across(placement.axis))
     hull = flat[ConvexHull(flat).vertices]
     edges = np.diff(hull, axis=0, append=hull[:1])
     edges /= np.linalg.norm(edges, axis=1, keepdims=True)

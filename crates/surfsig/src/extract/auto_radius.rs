@@ -3,9 +3,9 @@
 use super::explained::Shown;
 use super::neighborhood::distances_to_nearest;
 use super::radii::run_group;
-use super::{ExtractOptions, Extraction, Monitor, Queries, Status, check, with_some};
+use super::{ExtractOptions, Extraction, Queries, check, with_some};
 use crate::threads::with_threads;
-use crate::{Error, PointCloud, Radius};
+use crate::{Error, Monitor, PointCloud, Radius, Status};
 
 /// Fewest points of a ball that counts: ten more than a paraboloid has unknowns.
 const FEWEST: u32 = 16;

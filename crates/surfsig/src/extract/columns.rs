@@ -1,6 +1,7 @@
 //! The columns of an extraction while threads write to them.
 
-use super::{ExtractOptions, Extraction, Status};
+use super::{ExtractOptions, Extraction};
+use crate::Status;
 use crate::curvature::Principal;
 use crate::fit::paraboloid::Paraboloids;
 use crate::fit::quadric::Quadrics;

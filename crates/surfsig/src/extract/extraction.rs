@@ -1,9 +1,9 @@
 //! What an extraction gives: one struct of arrays, a status per point.
 
-use super::{Queries, Status};
+use super::Queries;
 use crate::curvature::Paraboloid;
 use crate::fit::{FitAxes, FitUsed};
-use crate::{PointCloud, Resolution};
+use crate::{PointCloud, Resolution, Status};
 
 /// Curvature and what belongs to it, one entry for each query, in the order of the queries.
 ///

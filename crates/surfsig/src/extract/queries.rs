@@ -1,8 +1,7 @@
 //! Where curvature is asked for.
 
-use super::Monitor;
 use crate::cell_index::CellIndex;
-use crate::{Error, PointCloud, Radius};
+use crate::{Error, Monitor, PointCloud, Radius};
 use rustc_hash::FxHashMap;
 
 /// The places at which curvature is asked for.

@@ -1,10 +1,8 @@
 //! Balls of several radii around every query, in one pass over the points.
 
-use super::{
-    Balls, ExtractOptions, Extraction, Found, Monitor, Neighborhood, Queries, Status, check, run, with_some,
-};
+use super::{Balls, ExtractOptions, Extraction, Found, Neighborhood, Queries, check, run, with_some};
 use crate::threads::with_threads;
-use crate::{Error, PointCloud, Radius};
+use crate::{Error, Monitor, PointCloud, Radius, Status};
 
 /// Balls that are walked together have radii down to this share of the largest: offsets in float32 are then
 /// exact enough for all.

@@ -1,12 +1,11 @@
 //! A thread's work where points are dense: whole regions, through the hierarchy.
 
-use super::Monitor;
 use super::columns::ColumnsPart;
 use super::shares::DenseCell;
 use super::worker::{Pending, Worker};
-use crate::Error;
 use crate::cell_index::CellIndex;
 use crate::simd::lanes::LANES;
+use crate::{Error, Monitor};
 
 impl Worker<'_> {
     /// Fills a part of the columns with the queries of these cells, one after the other; of one ball around each.

@@ -1,7 +1,8 @@
 //! The queries cut into shares, each for one thread at a time.
 
-use crate::cell_index::{CELLS_PER_ROW, CellIndex, Row, RowKey};
+use crate::cell_index::{CellIndex, Row};
 use crate::hierarchy::CELLS_PER_REGION;
+use crate::lattice::{CELLS_PER_ROW, RowKey};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::ops::Range;

@@ -2,20 +2,21 @@
 
 use super::columns::{ColumnsPart, Fit};
 use super::robust::{self, Distances, without_outliers};
-use super::{ExtractOptions, Monitor, Neighborhood};
-use crate::Error;
+use super::{ExtractOptions, Neighborhood};
 use crate::ball::DirectWalk;
-use crate::cell_index::{CellIndex, Row, RowKey};
+use crate::cell_index::{CellIndex, Row};
 use crate::fit::FitKind;
 use crate::fit::paraboloid::{Paraboloids, Task, fit_paraboloids};
 use crate::fit::quadric::fit_quadrics;
-use crate::fit::tensor::{Axes, MomentBatch, Vector};
 use crate::hierarchy::HierarchicalWalk;
+use crate::lattice::RowKey;
 use crate::members::Members;
 use crate::moments::{Moments, Scalar};
 use crate::shells::Shells;
 use crate::simd::InstructionSet;
 use crate::simd::lanes::{LANES, Lanes, Mask};
+use crate::tensor::{Axes, MomentBatch, Vector};
+use crate::{Error, Monitor};
 use std::ops::Range;
 
 /// Most queries that share their windows.

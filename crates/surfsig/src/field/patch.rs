@@ -5,6 +5,7 @@ use super::support::Support;
 use crate::ball::{BallVisitor, DirectWalk};
 use crate::cell_index::CellIndex;
 use crate::extract::{Extraction, extract_within};
+use crate::geometry::axes_across;
 use crate::simd::InstructionSet;
 use crate::simd::field::{Curved, LANES, Members, Pool, Pooling, along};
 use crate::simd::select::Block;
@@ -157,26 +158,13 @@ fn entry<T>(
     let count = patch.count;
     let axis = patch.axis(walk.set, fitted);
     if axis[0].is_finite() && count >= FEWEST {
-        let x = tangent(axis);
+        let [x, y] = axes_across(&axis.into()).map(Into::into);
         patch.pools.push(Pool::ZERO);
         let sums = patch.pools.last_mut().expect("just added");
-        patch.pooling.pool(walk.set, &patch.members, count, &[x, cross(axis, x), axis], sums);
+        patch.pooling.pool(walk.set, &patch.members, count, &[x, y, axis], sums);
         patch.waiting.push(number);
     }
     Entry { query, axis, count: count as u32, value: None }
-}
-
-/// A unit vector square to this one: from the coordinate axis that is farthest from it.
-fn tangent(axis: [f32; 3]) -> [f32; 3] {
-    let mut least = [0.0; 3];
-    least[(0..3).min_by(|&a, &b| axis[a].abs().total_cmp(&axis[b].abs())).unwrap_or(0)] = 1.0;
-    let across = cross(axis, least);
-    let length = across.iter().map(|c| c * c).sum::<f32>().sqrt();
-    across.map(|c| c / length)
-}
-
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// The entries in the order of the queries.
@@ -205,7 +193,8 @@ fn in_order<T>(
             (None, _) => Status::TooFewPoints,
         });
         found.axes.push(axis);
-        found.tangents.push(if axis[0].is_finite() { tangent(axis) } else { [f32::NAN; 3] });
+        let known = axis[0].is_finite();
+        found.tangents.push(if known { axes_across(&axis.into())[0].into() } else { [f32::NAN; 3] });
         found.count.push(count);
         found.values.push(value.unwrap_or_else(none));
     }

@@ -1,7 +1,7 @@
 //! What order 2 says, free of charge: the normal to start from, and how flat or long a set of points is.
 
-use super::tensor::Vector;
 use crate::simd::lanes::{Lanes, Mask};
+use crate::tensor::Vector;
 
 /// Eigenvalues in descending order, and the directions of the largest and the smallest.
 pub(crate) struct Spread {

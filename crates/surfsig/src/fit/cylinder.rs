@@ -5,6 +5,7 @@
 //! whose least value is sought from several starts.
 
 use super::taubin::{Best, Family, Pencil, Placement};
+use crate::geometry::axes_across;
 use crate::moments::Moments;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
@@ -88,15 +89,9 @@ fn spread_direction(index: usize) -> Vector3<f64> {
     Vector3::new(rho * cosine, rho * sine, z)
 }
 
-/// Two unit vectors at right angles to a third and to each other.
-fn across(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
-    let u = axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize();
-    [u, axis.cross(&u)]
-}
-
 /// The best cylinder about a direction.
 fn along(pencil: &Pencil, axis: &Vector3<f64>) -> Option<Best> {
-    let [u, v] = across(axis);
+    let [u, v] = axes_across(axis);
     let square = Matrix3::identity() - axis * axis.transpose();
     const PLACES: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
     pencil.best(&Family::from_fn(3, |term, member| match (term, member) {
@@ -116,7 +111,7 @@ fn descend(pencil: &Pencil, start: Vector3<f64>) -> Option<(Vector3<f64>, Best)>
     let mut best = along(pencil, &axis)?;
     let mut damping = 0.0;
     for _ in 0..MAX_STEPS {
-        let [u, v] = across(&axis);
+        let [u, v] = axes_across(&axis);
         let turned = |s: f64, t: f64| (axis + s * u + t * v).normalize();
         let at = |i: i32, j: i32| {
             Some(along(pencil, &turned(f64::from(i) * TURN, f64::from(j) * TURN))?.mean_square)

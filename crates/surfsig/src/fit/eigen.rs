@@ -2,8 +2,8 @@
 
 use super::covariance::rotation;
 use super::taubin::{PRODUCT, TERMS};
-use super::tensor::MomentBatch;
 use crate::simd::lanes::{Lanes, Mask};
+use crate::tensor::MomentBatch;
 
 /// One number for each of the nine monomials.
 pub(super) type Terms = [Lanes; TERMS];

@@ -3,10 +3,10 @@
 use super::paraboloid::{FitAxes, Task};
 use super::quadric::{Local, UNKNOWNS, fit_quadrics};
 use super::taubin::{Placement, TERMS};
-use super::tensor::MomentBatch;
 use crate::moments::Moments;
 use crate::simd::InstructionSet;
 use crate::simd::lanes::{Lanes, Mask};
+use crate::tensor::MomentBatch;
 
 /// The surface Q = 0 of a polynomial of second degree, in the coordinates of the moments.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -12,7 +12,6 @@ pub(crate) mod samples;
 mod shape_error;
 mod sphere;
 mod taubin;
-pub(crate) mod tensor;
 
 pub use cylinder::{Cylinder, fit_cylinder};
 pub use implicit::{Quadric, SurfacePoint, fit_quadric};

@@ -6,12 +6,12 @@
 
 use super::covariance::{Spread, spread};
 use super::shape_error::{ShapeFactor, shape_covariance};
-use super::tensor::{
-    Axes, MomentBatch, PatchMoments, Vector, add_scaled, chosen, cross, dot, inverted, normalised,
-};
 use crate::curvature::{Principal, principal_curvatures};
 use crate::simd::for_each_instruction_set;
 use crate::simd::lanes::{Lanes, Mask};
+use crate::tensor::{
+    Axes, MomentBatch, PatchMoments, Vector, add_scaled, chosen, cross, dot, inverted, normalised,
+};
 
 /// In which axes the paraboloid's height is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -9,10 +9,10 @@ use super::covariance::spread;
 use super::eigen::{Pencil, Smallest, Terms, dot_terms, hessian};
 use super::paraboloid::Task;
 use super::taubin::TERMS;
-use super::tensor::{Vector, add_scaled, chosen, cross, dot, inverted, normalised};
 use crate::curvature::Principal;
 use crate::simd::for_each_instruction_set;
 use crate::simd::lanes::{Lanes, Mask};
+use crate::tensor::{Vector, add_scaled, chosen, cross, dot, inverted, normalised};
 
 /// Unknowns with the constant and without the scale, hence the least number of points.
 pub(crate) const UNKNOWNS: usize = 9;

@@ -1,8 +1,8 @@
 //! How sure a paraboloid's curvature is: from the actual normal equations, not from a textbook's disc.
 
 use super::paraboloid::UNKNOWNS;
-use super::tensor::{Axes, Vector, dot};
 use crate::simd::lanes::Lanes;
+use crate::tensor::{Axes, Vector, dot};
 
 /// What is left of L D L^T for the unknowns a, e, b, which stand last: its last three rows.
 pub(crate) struct ShapeFactor {
@@ -58,10 +58,10 @@ fn weighted_product(p: &Vector, q: &Vector, weights: &Vector) -> Lanes {
 #[cfg(test)]
 mod tests {
     use super::super::paraboloid::turn_until_flat;
-    use super::super::tensor::MomentBatch;
     use super::*;
     use crate::moments::Moments;
     use crate::simd::lanes::{LANES, Mask};
+    use crate::tensor::MomentBatch;
 
     const SEED: u64 = 5;
 

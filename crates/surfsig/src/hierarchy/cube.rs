@@ -3,7 +3,7 @@
 //! Whole numbers throughout: what is inside a ball, and what is outside, is the same on every machine,
 //! in every tile and at every origin.
 
-use crate::cell_index::PARTS_PER_CELL;
+use crate::lattice::PARTS_PER_CELL;
 
 /// Parts per radius: a cell is half a radius wide.
 const RADIUS: i32 = 2 * PARTS_PER_CELL;

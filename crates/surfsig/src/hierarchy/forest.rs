@@ -4,7 +4,8 @@
 //! them, and go when the next region comes: no table of the whole cloud is ever held.
 
 use super::cube::Cube;
-use crate::cell_index::{CELLS_PER_ROW, CellIndex, PARTS_PER_CELL, Row, RowKey};
+use crate::cell_index::{CellIndex, Row};
+use crate::lattice::{CELLS_PER_ROW, PARTS_PER_CELL, RowKey};
 use crate::moments::MOMENTS;
 use crate::simd::select::{PADDING, Rows};
 use std::ops::Range;

@@ -2,7 +2,8 @@
 
 use super::{CELLS_PER_REGION, HierarchicalWalk};
 use crate::ball::DirectWalk;
-use crate::cell_index::{CELLS_PER_ROW, CellIndex, RowKey};
+use crate::cell_index::CellIndex;
+use crate::lattice::{CELLS_PER_ROW, RowKey};
 use crate::moments::Moments;
 use crate::simd::InstructionSet;
 use crate::{PointCloud, Radius};

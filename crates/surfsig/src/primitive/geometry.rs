@@ -1,6 +1,7 @@
 //! The surfaces, and how far points are from them.
 
 use super::SurfaceKind;
+use crate::geometry::axes_across;
 use nalgebra::Vector3;
 
 /// A point or a direction.
@@ -97,10 +98,8 @@ impl Primitive {
     }
 
     pub(crate) fn chart(&self) -> Chart {
-        let smallest = self.axis.iamin();
-        let first = self.axis.cross(&Vector::ith(smallest, 1.0)).normalize();
         let (sine, cosine) = self.half_angle.sin_cos();
-        Chart { primitive: *self, across: [first, self.axis.cross(&first)], sine, cosine }
+        Chart { primitive: *self, across: axes_across(&self.axis), sine, cosine }
     }
 
     /// Whether it is of its kind at all, for points that extend so far, and not `flat` times larger than these.

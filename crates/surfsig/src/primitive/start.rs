@@ -3,6 +3,7 @@
 use super::{Primitive, SurfaceKind, Vector};
 use crate::extract::extract_within;
 use crate::fit::{FitKind, fit_cylinder, fit_sphere};
+use crate::geometry::axes_across;
 use crate::{ExtractOptions, Moments, Monitor, Neighborhood, PointCloud, Queries};
 use nalgebra::{Matrix2, Matrix3, Matrix4, SymmetricEigen, Vector2, Vector4};
 
@@ -85,8 +86,7 @@ pub(crate) fn start(kind: SurfaceKind, points: &[Vector], normals: &[Vector]) ->
         SurfaceKind::Cylinder => {
             // All normals are across the axis.
             let axis = smallest(&normals.iter().map(|n| n * n.transpose()).sum())?;
-            let first = axis.cross(&Vector::ith(axis.iamin(), 1.0)).normalize();
-            let second = axis.cross(&first);
+            let [first, second] = axes_across(&axis);
             let seen = points.iter().map(|p| p - centre).map(|q| Vector2::new(q.dot(&first), q.dot(&second)));
             let (middle, radius) = circle(&seen.collect::<Vec<_>>())?;
             Some(Primitive { point: centre + middle.x * first + middle.y * second, axis, radius, ..none })
@@ -129,8 +129,7 @@ pub(crate) fn bent(simpler: &Primitive, kind: SurfaceKind, extent: f64) -> Vec<P
             .map(|axis| Primitive { kind, axis, half_angle: 0.1, ..*simpler })
             .into(),
         (SurfaceKind::Cylinder, SurfaceKind::Torus) => {
-            let across = simpler.axis.cross(&Vector::ith(simpler.axis.iamin(), 1.0)).normalize();
-            let other = simpler.axis.cross(&across);
+            let [across, other] = axes_across(&simpler.axis);
             let major_radius = 3.0 * (extent + simpler.radius);
             [across, -across, other, -other]
                 .map(|towards| Primitive {

@@ -6,7 +6,7 @@
 
 use super::InstructionSet;
 use super::instruction_set::Kind;
-use crate::cell_index::Lattice;
+use crate::lattice::Lattice;
 
 /// The ball is d^2 <= r^2 (1 + 1e-5), in units of r: float32 offsets cannot decide a tie, and on a
 /// regular grid many points lie exactly on the sphere.

@@ -4,10 +4,10 @@ use super::*;
 use crate::fit::paraboloid::{FitAxes, fit_paraboloids};
 use crate::fit::samples::{Draws, Point, Shape, turned};
 use crate::fit::taubin;
-use crate::fit::tensor::MomentBatch;
 use crate::moments::Moments;
 use crate::simd::InstructionSet;
 use crate::simd::lanes::LANES;
+use crate::tensor::MomentBatch;
 use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
 

@@ -11,6 +11,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.geometry import axes_across, skew
+
 Array = NDArray[np.float64]
 
 _SLIPS = 0.04
@@ -54,9 +56,7 @@ def free_directions_of_surface(kind: str, point: Array, axis: Array) -> list[Fre
         return [FreeDirection("turn", none, point)]
     turn = FreeDirection("turn", axis, point)
     if kind == "plane":
-        side = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
-        side /= np.linalg.norm(side)
-        return [turn, *(FreeDirection("slide", way, none) for way in (side, np.cross(axis, side)))]
+        return [turn, *(FreeDirection("slide", along, none) for along in axes_across(axis))]
     return [turn, FreeDirection("slide", axis, none)] if kind == "cylinder" else [turn]
 
 
@@ -86,9 +86,9 @@ def free_directions(points: Array, normals: Array) -> list[FreeDirection]:
     found: list[FreeDirection] = []
     if turns == 3:
         # v = w x (p - c) for all w: the centre is where every turn's axis passes.
-        design = np.concatenate([_cross_matrix(motion[:3]) for motion in mixed[:3]])
+        design = np.concatenate([skew(motion[:3]) for motion in mixed[:3]])
         centre, *_ = np.linalg.lstsq(design, -mixed[:3, 3:].ravel(), rcond=None)
-        found.append(FreeDirection("turn", none, middle - unit * centre * -1.0))
+        found.append(FreeDirection("turn", none, middle + unit * centre))
     else:
         for motion in mixed[:turns]:
             rate = float(np.linalg.norm(motion[:3]))
@@ -98,12 +98,6 @@ def free_directions(points: Array, normals: Array) -> list[FreeDirection]:
     for motion in mixed[turns:]:
         found.append(FreeDirection("slide", motion[3:] / np.linalg.norm(motion[3:]), none))
     return found
-
-
-def _cross_matrix(w: Array) -> Array:
-    """Give the matrix of c -> w x c."""
-    x, y, z = w
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _text(vector: Array) -> str:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from surfsig.field import FieldMatches, FieldSignatures
+from surfsig.geometry import fit_transform, rotate, transform_points
 
 Array = NDArray[np.float64]
 
@@ -75,8 +75,8 @@ class Pairs:
 
     def agreeing(self, pose: Array) -> NDArray[np.bool_]:
         """Tell which pairs agree with a pose, (k,)."""
-        gap = np.linalg.norm(self.source @ pose[:3, :3].T + pose[:3, 3] - self.target, axis=1)
-        along = np.einsum("ij,ij->i", self.source_axes @ pose[:3, :3].T, self.target_axes)
+        gap = np.linalg.norm(transform_points(pose, self.source) - self.target, axis=1)
+        along = np.einsum("ij,ij->i", rotate(pose, self.source_axes), self.target_axes)
         return np.asarray((gap < _NEAR * self.radius) & (along > _ALONG))
 
 
@@ -87,8 +87,8 @@ def agreed_pose(pairs: Pairs) -> Array:
     """
     best, highest = np.eye(4), -1.0
     for pose in pairs.poses[:_PROPOSALS]:
-        gap = np.linalg.norm(pairs.source @ pose[:3, :3].T + pose[:3, 3] - pairs.target, axis=1)
-        along = np.einsum("ij,ij->i", pairs.source_axes @ pose[:3, :3].T, pairs.target_axes)
+        gap = np.linalg.norm(transform_points(pose, pairs.source) - pairs.target, axis=1)
+        along = np.einsum("ij,ij->i", rotate(pose, pairs.source_axes), pairs.target_axes)
         # A near partner counts more than one at the limit.
         closeness = np.maximum(1.0 - (gap / (_NEAR * pairs.radius)) ** 2, 0.0)
         score = float(closeness[along > _ALONG].sum())
@@ -98,7 +98,7 @@ def agreed_pose(pairs: Pairs) -> Array:
     for _ in range(_ROUNDS):
         if agree.sum() < 3:
             break
-        pose = _fitted(pairs.source[agree], pairs.target[agree])
+        pose = fit_transform(pairs.source[agree], pairs.target[agree])
         now = pairs.agreeing(pose)
         if now.sum() < agree.sum():
             break
@@ -106,13 +106,3 @@ def agreed_pose(pairs: Pairs) -> Array:
         if same:
             break
     return best
-
-
-def _fitted(source: Array, target: Array) -> Array:
-    """Fit the pose that brings places onto others: least squares."""
-    ours, theirs = source.mean(axis=0), target.mean(axis=0)
-    rotation, _ = Rotation.align_vectors(target - theirs, source - ours)
-    pose = np.eye(4)
-    pose[:3, :3] = rotation.as_matrix()
-    pose[:3, 3] = theirs - pose[:3, :3] @ ours
-    return pose

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
 
-from surfsig.registration.blocks import blocks, clustered_covariance
+from surfsig.alignment.blocks import blocks, clustered_covariance
+from surfsig.geometry import about, transform_points
 
 Array = NDArray[np.float64]
 
@@ -155,7 +155,7 @@ def contact(source: Array, surface: Surface, pose: Array, voxel: float) -> Conta
         Between the places.
     """
     for step in range(_STEPS + 1):
-        moved = source @ pose[:3, :3].T + pose[:3, 3]
+        moved = transform_points(pose, source)
         found = surface.heights(moved)
         if len(found.which) < 12:
             return None
@@ -171,10 +171,7 @@ def contact(source: Array, surface: Surface, pose: Array, voxel: float) -> Conta
         if step == _STEPS:
             break
         change = -np.linalg.lstsq(information, design.T @ heights, rcond=1e-8)[0]
-        motion = np.eye(4)
-        motion[:3, :3] = Rotation.from_rotvec(change[:3] / unit).as_matrix()
-        motion[:3, 3] = center - motion[:3, :3] @ center + change[3:]
-        pose = motion @ pose
+        pose = about(center, change[:3] / unit, change[3:]) @ pose
     independent = _independent(design, heights, found, on)
     covariance = independent * _alike(design, heights, places, independent)
     # The turns were counted in ways of the places.

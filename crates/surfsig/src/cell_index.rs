@@ -1,9 +1,6 @@
 //! Points sorted into rows of cells, to be streamed: the sparse index of a cloud for one radius.
 
-mod lattice;
-
-pub(crate) use lattice::{CELLS_PER_ROW, Lattice, PARTS_PER_CELL, RowKey};
-
+use crate::lattice::{Lattice, RowKey};
 use crate::simd::select::PADDING;
 use crate::{Error, Monitor, PointCloud, Radius};
 use rayon::prelude::*;
