@@ -74,3 +74,36 @@ def test_near_that_no_surface_reaches_is_refused(shell: Callable[..., Any], tmp_
     with pytest.raises(surfsig.InvalidInputError, match="no point is within the radius"):
         surfsig.fit_sphere(surfsig.read(file), near=[0, 0, 1.0], radius=0.1)
     assert surfsig.fit_sphere(surfsig.read(file), near=[0, 0, 1.4]).radius == pytest.approx(0.5, abs=1e-3)
+
+
+def test_found_instances_have_the_digits_of_their_errors() -> None:
+    from surfsig.finding.instances import Instance, Instances
+
+    pose = np.eye(4)
+    pose[:3, 3] = [389000.123456, 5819000.654321, 40.5]
+    covariance = np.diag([1e-6] * 3 + [1e-8, 4e-8, 1e-4])
+    instance = Instance(
+        name="cup",
+        T_scene_model=pose,
+        covariance=covariance,
+        center=pose[:3, 3],
+        score=0.5,
+        visible=0.5,
+        overlap=0.5,
+        rms=0.001,
+        free_directions=[],
+        indices=np.arange(3),
+    )
+    found = Instances([instance], surfsig.PointCloud(np.zeros((3, 3))), {})
+    header, rows = found.table()
+    assert rows[0][header.index("at")] == "389000.12346 5819000.65432 40.500"
+
+
+def test_compare_prints_curvatures_with_their_errors(shell: Callable[..., Any], tmp_path: Path) -> None:
+    file = tmp_path / "ball.ply"
+    surfsig.write(file, sphere_at([389000.0, 5819000.0, 40.0]))
+    at = "389000,5819000,40.5"
+    out = shell("compare", file, file, "--at", at, "--at", at, "--radius", 0.25).out
+    assert "at 389000, 5819000, 40.5" in out
+    there = surfsig.extract(surfsig.read(file), 0.25, at=[[389000.0, 5819000.0, 40.5]])
+    assert f"k1 {with_error(float(there.k1[0]), float(there.k1_std[0]))}" in out

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 
 from surfsig import _surfsig
 from surfsig.point_cloud import PointCloud
+from surfsig.units import size_of
 
 
 def number_step(cloud: PointCloud) -> float:
@@ -35,6 +37,19 @@ def warn_if_too_coarse(cloud: PointCloud, length: float, what: str, stacklevel: 
     # Points that are all at one place have no patches.
     if length > 0 and number_step(cloud) > _surfsig.COARSEST_STEP * length:
         told = f"{step_text(cloud)}, too coarse for {what} of {length:.3g}"
+        warnings.warn(told, stacklevel=stacklevel)
+
+
+def warn_if_surface_is_lost(cloud: PointCloud, stacklevel: int = 3) -> None:
+    """Warn where float32 coordinates have steps larger than points of a surface are apart.
+
+    The distance between points is estimated by their number and extent, as of a surface: 2 s / sqrt(n), with
+    s the median distance of the points from their median.
+    """
+    step = number_step(cloud)
+    size = size_of(cloud) if step > 0.0 else 0.0
+    if size > 0.0 and step > 2.0 * size / math.sqrt(len(cloud)):
+        told = f"{step_text(cloud)}, larger than the distance between points: the surface is lost in them"
         warnings.warn(told, stacklevel=stacklevel)
 
 

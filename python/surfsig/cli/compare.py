@@ -11,7 +11,7 @@ import click
 from surfsig import defaults
 from surfsig.cli.console import number, print_json, print_table
 from surfsig.cli.options import CLOUD, axes_option, input_options, json_option, position, threads_option
-from surfsig.digits import position_text
+from surfsig.digits import position_text, with_error
 
 if TYPE_CHECKING:
     from surfsig import Extraction, PointCloud
@@ -93,7 +93,8 @@ def compare_command(
             raise surfsig.InvalidInputError(text if hint is None else f"{text}; {hint}")
         place: dict[str, Any] = {"file": str(file), "at": spot, "status": status}
         place |= {"count": int(result.count[0])}
-        place |= {name: float(getattr(result, name)[0]) for name in ("k1", "k2", "residual")}
+        names = ("k1", "k2", "k1_std", "k2_std", "residual")
+        place |= {name: float(getattr(result, name)[0]) for name in names}
         places.append(place)
     flat = surfsig.flat_atom_length(*found)
     rows = np.vstack([result.signatures(flat_atom=flat) for result in found])
@@ -110,7 +111,8 @@ def compare_command(
     table = [("zeta", f"{number(zeta)} ({values['class']})")]
     for name, place in zip("AB", places, strict=True):
         table.append((name, f"{place['file']} at {position_text(place['at'])}"))
-        curvature = f"k1 {number(place['k1'])}, k2 {number(place['k2'])} per unit"
+        k1, k2 = (_curvature(place[name], place[f"{name}_std"]) for name in ("k1", "k2"))
+        curvature = f"k1 {k1}, k2 {k2} per unit"
         table.append(
             ("", f"{curvature}, from {place['count']:,} points, residual {number(place['residual'])}")
         )
@@ -122,3 +124,8 @@ def _hint(a: Path, b: Path, clouds: dict[Path, PointCloud]) -> str | None:
     import surfsig
 
     return None if a == b else surfsig.unit_mismatch(clouds[a], clouds[b], (str(a), str(b)))
+
+
+def _curvature(value: float, error: float) -> str:
+    """Write a curvature with its standard error, which the sensor's axes have not."""
+    return with_error(value, error) if error > 0.0 else number(value)

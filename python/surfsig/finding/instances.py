@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.cloud_transforms import transform_cloud
 from surfsig.colors import GREY, distinct_colors
-from surfsig.digits import position_text
+from surfsig.digits import position_text, rounded
 from surfsig.point_cloud import PointCloud
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ class Instances:
                     instance.name,
                     f"{instance.score:.2f}",
                     f"{instance.visible:.0%}",
-                    position_text(instance.T_scene_model[:3, 3], " "),
+                    _with_digits(instance),
                     " ".join(f"{value:.1f}" for value in turn),
                     f"{instance.rms:.2g}",
                     f"{len(instance.indices)}",
@@ -253,3 +253,12 @@ class Instances:
         names = ["name", "score", "visible", "overlap", "rms", "points"]
         names += ["qx", "qy", "qz", "qw", "tx", "ty", "tz", "free"]
         return pandas.DataFrame(rows, columns=names)
+
+
+def _with_digits(instance: Instance) -> str:
+    """Write where the model's origin is, with the digits of the standard errors where these are known."""
+    errors = np.sqrt(np.diag(instance.covariance)[3:])
+    position = instance.T_scene_model[:3, 3]
+    if not (np.isfinite(errors) & (errors > 0.0)).all():
+        return position_text(position, " ")
+    return " ".join(rounded(value, error) for value, error in zip(position, errors, strict=True))

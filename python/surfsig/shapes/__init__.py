@@ -11,6 +11,7 @@ from surfsig.clean import COORDINATE_LIMIT
 from surfsig.digits import position_text
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud, position_array
+from surfsig.resolution import warn_if_surface_is_lost
 from surfsig.shapes.fitted import FittedShape, fitted_shape
 from surfsig.shapes.growth import grown
 from surfsig.shapes.robust import Kind, settled
@@ -127,6 +128,7 @@ def _fit(
     robust: bool,
 ) -> FittedShape:
     cloud = PointCloud.of(data)
+    warn_if_surface_is_lost(cloud, stacklevel=4)
     finite = cloud.finite
     points = cloud.offsets[finite].astype(np.float64)
     unknowns = _surfsig.KIND_PARAMETERS[kind]

@@ -11,6 +11,7 @@ from surfsig import _surfsig
 from surfsig.arguments import MOST_NEIGHBORS, positive_length, thread_count, whole_number
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud
+from surfsig.resolution import warn_if_surface_is_lost
 from surfsig.surfaces.classes import members_of
 from surfsig.surfaces.found import Surfaces
 from surfsig.surfaces.surface import KINDS, Kind, described
@@ -57,8 +58,14 @@ def surfaces(
     ------
     InvalidInputError
         If an argument has no meaning; its text says which.
+
+    Warns
+    -----
+    UserWarning
+        If coordinates come in steps that are larger than the distance between points.
     """
     scan = PointCloud.of(cloud)
+    warn_if_surface_is_lost(scan)
     threads = thread_count(threads)
     noise = None if noise is None else positive_length(noise, "noise")
     labels, entries = _surfsig.find_surfaces(
