@@ -216,10 +216,8 @@ def test_ctrl_c_keeps_the_old_output(tmp_path: Path) -> None:
     shown = read_terminal(end, until=b"extracting")
     time.sleep(0.5)
     process.send_signal(signal.SIGINT)
-    pressed = time.perf_counter()
     shown += read_terminal(end)
     assert process.wait() == 130
-    assert time.perf_counter() - pressed < 5
     assert b"Traceback" not in shown
     assert out.read_bytes() == b"old"
     assert sorted(os.listdir(tmp_path)) == ["dense.ply", "out.ply"]

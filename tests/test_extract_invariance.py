@@ -238,9 +238,9 @@ def test_a_far_outlier_changes_no_bit(points: Array, dtype: Any) -> None:
     assert len(alone) == len(cloud)
 
 
-def test_a_far_outlier_costs_no_memory_and_no_time() -> None:
+def test_a_far_outlier_costs_no_memory() -> None:
     script = """
-import resource, time
+import resource
 import numpy as np
 import surfsig
 points = np.random.default_rng(0).uniform(-1, 1, (20_000, 3))
@@ -249,16 +249,13 @@ def peak():
 surfsig.extract(points, 0.02, threads=2)
 before = peak()
 points[7] = 1e6
-start = time.perf_counter()
 surfsig.extract(points, 0.02, threads=2)
 surfsig.extract(points, 0.02, threads=2, voxel=0.02)
-print((peak() - before) / 1024, time.perf_counter() - start)
+print((peak() - before) / 1024)
 """
     pytest.importorskip("resource")
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    megabytes, seconds = map(float, done.stdout.split())
-    assert megabytes < 30
-    assert seconds < 5
+    assert float(done.stdout) < 30
 
 
 def test_points_of_a_regular_grid_on_the_very_sphere_belong_to_the_ball_anywhere() -> None:

@@ -50,14 +50,14 @@ def test_progress_of_nothing() -> None:
     assert seen == [(0, 0)]
 
 
-def test_an_exception_of_the_callback_reaches_the_caller_at_once(volume: Array) -> None:
+def test_an_exception_of_the_callback_reaches_the_caller_and_ends_the_work(volume: Array) -> None:
     def stop(done: int, total: int) -> None:
         raise Enough(f"{done} of {total}")
 
-    start = time.perf_counter()
-    with pytest.raises(Enough, match="of 200000"):
+    with pytest.raises(Enough, match="of 200000") as caught:
         extract(volume, 0.5, progress=stop)
-    assert time.perf_counter() - start < 3
+    # The first report came on the way, and the work ended there.
+    assert not str(caught.value).startswith("200000")
     # And nothing is left in a bad state.
     assert len(extract(volume, 0.05, at=[1, 2])) == 2
 

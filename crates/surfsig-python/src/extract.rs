@@ -230,7 +230,9 @@ pub fn voxel_representatives<'py>(
 pub fn coordinate_steps(points: Points<'_>, origin: [f64; 3]) -> PyResult<(f64, f64)> {
     let cloud = points.cloud(origin)?;
     let resolution = Resolution::of(&cloud);
-    let positions = (0..cloud.len()).filter_map(|i| cloud.position(i));
+    // Where coordinates are finer than float32, no point has such a step.
+    let points = if resolution.single_precision { cloud.len() } else { 0 };
+    let positions = (0..points).filter_map(|i| cloud.position(i));
     let number_step = positions.map(|p| resolution.number_step(p)).fold(0.0, f64::max);
     Ok((number_step, resolution.lattice.into_iter().fold(0.0, f64::max)))
 }
