@@ -42,7 +42,7 @@ PYTHON_EXCEPTIONS = {
 RUST_FLOORS = (
     ("error",),
     ("geometry", "similarity", "point_cloud", "threads", "moments", "monitor", "status"),
-    ("lattice", "resolution", "depth_image"),
+    ("lattice", "resolution", "depth_image", "kd_tree"),
     ("simd",),
     ("cell_index", "surface_index", "tensor"),
     ("ball", "curvature"),
@@ -50,7 +50,7 @@ RUST_FLOORS = (
     ("members", "shells", "hierarchy"),
     ("extract",),
     ("field", "primitive"),
-    ("surfaces",),
+    ("surfaces", "alignment"),
 )
 """Modules of the core, the lowest floor first."""
 
