@@ -16,7 +16,7 @@ Uses = dict[tuple[str, str], set[str]]
 
 PYTHON_FLOORS = (
     ("_surfsig", "errors", "defaults", "digits", "colors", "wkt"),
-    ("geometry", "coordinate_system", "similarity", "flat_atom", "plot"),
+    ("geometry", "coordinate_system", "signature_similarity", "flat_atom", "plot"),
     ("point_cloud",),
     ("arguments", "orientation", "spacing", "units", "missing_returns", "cloud_transforms"),
     ("resolution",),
