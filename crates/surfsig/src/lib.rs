@@ -89,6 +89,7 @@ pub use geometry::{RigidTransform, TransformError};
 pub use kd_tree::KdTree;
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use monitor::Monitor;
+pub use orientation::consistent_directions;
 pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
 pub use registration::{REGISTRATION_STEPS, Registration, RegistrationSettings, register};
