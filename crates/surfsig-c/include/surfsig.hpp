@@ -438,12 +438,12 @@ public:
     return made;
   }
   /** Where a point is in the target. */
-  Vector operator()(const Vector &point) const {
+  Vector transform_point(const Vector &point) const {
     Vector moved;
     check(surfsig_transform_points(&transform_, point.data(), 1, sizeof point, moved.data()));
     return moved;
   }
-  std::vector<Vector> operator()(const std::vector<Vector> &points) const {
+  std::vector<Vector> transform_points(const std::vector<Vector> &points) const {
     std::vector<Vector> moved(points.size());
     if (points.empty()) return moved;
     check(surfsig_transform_points(&transform_, points.front().data(), points.size(), sizeof(Vector),
@@ -451,7 +451,7 @@ public:
     return moved;
   }
   /** What a vector, such as a normal, is in the target: not translated. */
-  Vector rotate(const Vector &vector) const {
+  Vector transform_vector(const Vector &vector) const {
     Vector rotated;
     check(surfsig_transform_vectors(&transform_, vector.data(), 1, sizeof vector, rotated.data()));
     return rotated;
