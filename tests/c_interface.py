@@ -23,7 +23,7 @@ from ctypes import (
 )
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -196,12 +196,10 @@ class CInterface:
     def cloud_of(self, points: NDArray[Any], *, origin: Any = None) -> Any:
         """Make a cloud of the rows of an array, whatever their distance."""
         precision = "f64" if points.dtype == np.float64 else "f32"
-        return self.cloud(
-            address(points), len(points), points.strides[0], precision=precision, origin=origin
-        )
+        return self.cloud(address(points), len(points), points.strides[0], precision=precision, origin=origin)
 
     def extract(
-        self, cloud: c_void_p, radius: float | str | None, options: Options | None = None
+        self, cloud: c_void_p, radius: float | Literal["auto"], options: Options | None = None
     ) -> c_void_p:
         """Return an extraction that the caller frees; of `radius` neighbours where that is a whole number."""
         f = self.functions

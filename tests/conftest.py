@@ -78,7 +78,11 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
             pytest.skip(f"{tool} is not installed")
     source = Path(__file__).parents[1] / "crates" / "surfsig-c"
     build, prefix = tmp_path_factory.mktemp("build"), tmp_path_factory.mktemp("prefix")
-    for arguments in (["-S", source, "-B", build], ["--build", build], ["--install", build, "--prefix", prefix]):
+    for arguments in (
+        ["-S", source, "-B", build],
+        ["--build", build],
+        ["--install", build, "--prefix", prefix],
+    ):
         finished = subprocess.run(["cmake", *map(str, arguments)], capture_output=True, text=True)
         assert finished.returncode == 0, finished.stdout + finished.stderr
     return prefix

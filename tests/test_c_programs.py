@@ -1,4 +1,4 @@
-"""Programs in C and C++ against the installed interface: they compile without a warning, run, and are right."""
+"""Programs in C and C++ against the installed interface: they compile without a warning, and are right."""
 
 import os
 import shutil
@@ -62,7 +62,8 @@ int main() {
       cloud, surfsig::Options().positions({{{1.5, 1.5, 3.0}}}).normals({{{0.0f, 0.0f, -1.0f}}}));
   std::printf("%u %u %u %d %zu %zu\\n", radii[0].count()[464], radii[1].count()[464], nearest.count()[0],
               nearest.indices().size() == nearest.size(), own.indices().size(), own.radii().size());
-  std::printf("%.1f %d %d %zu\\n", own.normals()[2], own.oriented(), nearest.oriented(), own.fit_used().size());
+  std::printf("%.1f %d %d %zu\\n", own.normals()[2], own.oriented(), nearest.oriented(),
+              own.fit_used().size());
 
   surfsig::SurfaceOptions stopping;
   stopping.progress([](std::size_t, std::size_t) -> bool { throw std::logic_error("thrown by the caller"); });
@@ -71,11 +72,13 @@ int main() {
   } catch (const std::logic_error &error) {
     std::printf("%s\\n", error.what());
   }
-  const auto floor = surfsig::find_surfaces(cloud, surfsig::SurfaceOptions().kinds({SURFSIG_SURFACE_KIND_PLANE}));
+  const std::vector<surfsig_surface_kind> kinds{SURFSIG_SURFACE_KIND_PLANE};
+  const auto floor = surfsig::find_surfaces(cloud, surfsig::SurfaceOptions().kinds(kinds));
   const auto plane = surfsig::fit_primitive(cloud, floor.kind()[0]);
   const auto again = surfsig::fit_primitive(cloud, SURFSIG_SURFACE_KIND_PLANE, &plane);
   std::printf("%zu %zu %.1f %zu %.1f %zu\\n", floor.size(), floor.covariance(0).size(), again.axis()[2],
-              plane.uncertainty(cloud).covariance.size(), plane.distances(cloud)[7], floor.covariance(1).size());
+              plane.uncertainty(cloud).covariance.size(), plane.distances(cloud)[7],
+              floor.covariance(1).size());
   surfsig::Moments moments(cloud, {{1.5, 1.5, 3.0}});
   try {
     (moments += moments).sphere();
@@ -88,7 +91,8 @@ int main() {
   const auto moved = half.transform_point({{1.0, 0.0, 0.0}});
   const auto back = half.inverse().transform_points({moved})[0];
   const auto rotated = quarter.transform_vector({{1.0, 0.0, 0.0}});
-  std::printf("%g %g %g, %g %g %g, %g\\n", moved[0], moved[1], moved[2], back[0], back[1], back[2], rotated[1]);
+  std::printf("%g %g %g, %g %g %g, %g\\n", moved[0], moved[1], moved[2], back[0], back[1], back[2],
+              rotated[1]);
   std::printf("%.3f %.3f\\n", surfsig::Isometry::exp(quarter.log()).data()[1], quarter.adjoint()[6]);
 }
 """
