@@ -1,4 +1,4 @@
-"""The C interface's surfaces, fits, transforms: the values are Python's, bit for bit, or those of a formula."""
+"""The C interface's surfaces, fits, transforms: values are Python's, bit for bit, or those of a formula."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
