@@ -65,7 +65,7 @@ fuzz: build ## Read damaged files of all formats: make fuzz COUNT=100000
 docs: build ## Build the API reference: target/doc (Rust) and build/docs (Python, the C headers)
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 	$(BIN)/python -W error -m pdoc --docformat numpy --output-directory build/docs surfsig
-	cp crates/surfsig-c/include/surfsig.h crates/surfsig-c/include/surfsig.hpp build/docs
+	cp crates/surfsig-c/include/*.h crates/surfsig-c/include/*.hpp build/docs
 
 tour: build ## Run the code of docs/tour.md, and draw its pictures
 	$(BIN)/python examples/tour.py

@@ -42,9 +42,9 @@ PYTHON_EXCEPTIONS = {
 RUST_FLOORS = (
     ("error",),
     ("geometry", "similarity", "point_cloud", "threads", "moments", "monitor", "status"),
-    ("lattice", "resolution", "depth_image", "kd_tree", "voxels", "scan"),
+    ("lattice", "resolution", "depth_image", "kd_tree", "voxels"),
     ("simd",),
-    ("cell_index", "surface_index", "tensor"),
+    ("cell_index", "surface_index", "tensor", "scan"),
     ("ball", "curvature"),
     ("block_sums", "fit", "frame"),
     ("members", "shells", "hierarchy"),
