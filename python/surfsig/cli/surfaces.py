@@ -129,6 +129,6 @@ def _values(file: Path, found: Surfaces, recurring: Recurrences | None) -> dict[
         "summary": found.summary(),
         "points": len(found.cloud),
         "classes": {kind.name.lower(): counts[kind] for kind in PointClass},
-        "surfaces": [{"number": number, **surface.values()} for number, surface in enumerate(found)],
+        "surfaces": [{"number": number, **surface.to_dict()} for number, surface in enumerate(found)],
     }
     return values if recurring is None else values | {"recurrences": recurring.values()}

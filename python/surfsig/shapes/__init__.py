@@ -12,13 +12,13 @@ from surfsig.digits import position_text
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud, position_array
 from surfsig.resolution import warn_if_surface_is_lost
-from surfsig.shapes.fitted import FittedShape, fitted_shape
 from surfsig.shapes.growth import grown
-from surfsig.shapes.robust import Kind, settled
+from surfsig.shapes.robust import settled
+from surfsig.shapes.surface import KINDS, Kind, Surface, measured_surface
 
 Array = NDArray[np.float64]
 
-__all__ = ["FittedShape", "fit_cylinder", "fit_plane", "fit_sphere"]
+__all__ = ["KINDS", "Kind", "Surface", "fit_cylinder", "fit_plane", "fit_sphere"]
 
 
 def fit_sphere(
@@ -27,7 +27,7 @@ def fit_sphere(
     near: ArrayLike | None = None,
     radius: float | None = None,
     robust: bool = False,
-) -> FittedShape:
+) -> Surface:
     """Fit a sphere to points, or to the points of a scan that are on a sphere near a place.
 
     The sum of squared distances from the surface is least. The standard errors do not rely on the number of
@@ -55,7 +55,7 @@ def fit_sphere(
 
     Returns
     -------
-    FittedShape
+    Surface
         With `radius`, its standard error `radius_std` and its 95 % `interval`.
 
     Raises
@@ -72,7 +72,7 @@ def fit_cylinder(
     near: ArrayLike | None = None,
     radius: float | None = None,
     robust: bool = False,
-) -> FittedShape:
+) -> Surface:
     """Fit a cylinder without ends to points, or to those of a scan that are on a cylinder near a place.
 
     Parameters
@@ -82,7 +82,7 @@ def fit_cylinder(
 
     Returns
     -------
-    FittedShape
+    Surface
         With `axis`, `radius`, its standard error `radius_std` and its 95 % `interval`.
 
     Raises
@@ -99,7 +99,7 @@ def fit_plane(
     near: ArrayLike | None = None,
     radius: float | None = None,
     robust: bool = False,
-) -> FittedShape:
+) -> Surface:
     """Fit a plane to points, or to those of a scan that are on a plane near a place.
 
     Parameters
@@ -109,7 +109,7 @@ def fit_plane(
 
     Returns
     -------
-    FittedShape
+    Surface
         With the normal as `axis`.
 
     Raises
@@ -126,7 +126,7 @@ def _fit(
     place: ArrayLike | None,
     radius: float | None,
     robust: bool,
-) -> FittedShape:
+) -> Surface:
     cloud = PointCloud.of(data)
     warn_if_surface_is_lost(cloud, stacklevel=4)
     finite = cloud.finite
@@ -148,10 +148,29 @@ def _fit(
     if found is None:
         where = "" if place is None else " near that place"
         raise InvalidInputError(f"the points{where} determine no {kind}")
-    surface, chosen = found
-    inliers = np.zeros(len(cloud), np.bool_)
-    inliers[np.flatnonzero(finite)[chosen]] = True
-    return fitted_shape(kind, surface, cloud, inliers)
+    primitive, chosen = found
+    return _described(kind, primitive, points[chosen], cloud.origin, np.flatnonzero(finite)[chosen])
+
+
+def _described(
+    kind: Kind, primitive: _surfsig.Primitive, points: Array, origin: Array, members: NDArray[np.intp]
+) -> Surface:
+    """Describe a surface that was fitted to points, both less the origin."""
+    covariance, across, freedom = primitive.uncertainty(points)
+    squares = float((primitive.distances(points) ** 2).sum())
+    fitted = {
+        "kind": kind,
+        "point": primitive.point + origin,
+        "axis": np.full(3, np.nan) if kind == "sphere" else primitive.axis,
+        "radius": primitive.radius,
+        "major_radius": np.nan,
+        "half_angle": np.nan,
+        "deviation": np.sqrt(squares / (len(points) - _surfsig.KIND_PARAMETERS[kind])),
+        "covariance": covariance,
+        "across": across,
+        "freedom": freedom,
+    }
+    return measured_surface(fitted, points, origin, members)
 
 
 def _check_near(points: Array, place: Array, radius: float | None, given: Array) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig import _surfsig
-from surfsig.shapes.robust import MAX_PASSES, Array, Kind, near, rounding_of, settled
+from surfsig.shapes.robust import MAX_PASSES, Array, near, rounding_of, settled
+from surfsig.shapes.surface import Kind
 
 Mask = NDArray[np.bool_]
 

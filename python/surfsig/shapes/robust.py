@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
 from surfsig import _surfsig
+from surfsig.shapes.surface import Kind
 
 Array = NDArray[np.float64]
-
-Kind = Literal["sphere", "cylinder", "plane"]
 
 FAR = 3.0
 """A point this many standard deviations from the surface is an outlier, as for `surfsig.extract`."""

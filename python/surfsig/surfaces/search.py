@@ -12,9 +12,9 @@ from surfsig.arguments import MOST_NEIGHBORS, positive_length, thread_count, who
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud
 from surfsig.resolution import warn_if_surface_is_lost
+from surfsig.shapes.surface import KINDS, Kind, measured_surface
 from surfsig.surfaces.classes import members_of
 from surfsig.surfaces.found import Surfaces
-from surfsig.surfaces.surface import KINDS, Kind, described
 
 
 def find_surfaces(
@@ -79,7 +79,7 @@ def find_surfaces(
     )
     members = members_of(labels, len(entries))
     found = [
-        described(entry, scan.offsets[chosen].astype(np.float64), scan.origin)
+        measured_surface(entry, scan.offsets[chosen].astype(np.float64), scan.origin, chosen)
         for entry, chosen in zip(entries, members, strict=True)
     ]
     return Surfaces(scan, labels, found, noise, threads)
