@@ -15,10 +15,11 @@ Uses = dict[tuple[str, str], set[str]]
 """Pairs of rooms of which the first uses the second, and the files that do."""
 
 PYTHON_FLOORS = (
-    ("_surfsig", "errors", "defaults", "digits", "colors", "wkt"),
+    ("_surfsig", "errors", "defaults", "digits", "colors", "wkt", "progress"),
+    ("arguments", "threads"),
     ("geometry", "coordinate_system", "signature_similarity", "flat_atom", "plot"),
     ("point_cloud",),
-    ("arguments", "orientation", "spacing", "units", "missing_returns", "cloud_transforms"),
+    ("orientation", "spacing", "units", "missing_returns", "cloud_transforms"),
     ("resolution",),
     ("places", "visibility", "simulate"),
     ("files",),

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from surfsig.cli.console import number, print_json, print_table
-from surfsig.cli.options import CLOUD, input_options, json_option, position
+from surfsig.cli.console import number, on_terminal, print_json, print_table, progress_bar
+from surfsig.cli.options import CLOUD, input_options, json_option, position, threads_option
 from surfsig.defaults import INTERVAL
 from surfsig.digits import rounded, with_error
 
@@ -46,22 +46,29 @@ def _shape_command(name: str, fit: str, text: str) -> click.Command:
     )
     @click.option("--robust", is_flag=True, help="Leave out points that are far from the surface.")
     @input_options
+    @threads_option
     @json_option
     def command(
         file: Path,
         near: tuple[float, float, float] | None,
         radius: float | None,
         robust: bool,
+        threads: int | None,
         as_json: bool,
         **reading: Any,
     ) -> None:
         import surfsig
         from surfsig.missing_returns import warn_of_missing_returns
 
-        cloud = surfsig.read(file, **reading)
+        shown = on_terminal()
+        with progress_bar("reading", "bytes", shown=shown) as progress:
+            cloud = surfsig.read(file, progress=progress, **reading)
         warn_of_missing_returns(cloud, str(file))
         try:
-            surface = getattr(surfsig, fit)(cloud, near=near, radius=radius, robust=robust)
+            with progress_bar("fitting", "steps", shown=shown) as progress:
+                surface = getattr(surfsig, fit)(
+                    cloud, near=near, radius=radius, robust=robust, threads=threads, progress=progress
+                )
         except surfsig.InvalidInputError as error:
             raise surfsig.InvalidInputError(f"{file}: {error}") from None
         if as_json:

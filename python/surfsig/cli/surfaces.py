@@ -98,7 +98,7 @@ def surfaces_command(
     recurring = None
     if recurrences:
         with progress_bar("comparing", "pairs", shown=shown) as progress:
-            recurring = surfsig.find_recurrences(found, progress=progress)
+            recurring = surfsig.find_recurrences(found, threads=threads, progress=progress)
     if output is not None:
         columns = {**found.columns(), "colors": found.colors}
         if recurring is not None:

@@ -7,11 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from surfsig import _surfsig
-from surfsig.arguments import positive_length, thread_count, whole_number
+from surfsig.arguments import positive_length, progress_callback, thread_count, whole_number
 from surfsig.defaults import KEYPOINT_CANDIDATES, KEYPOINTS
 from surfsig.errors import InvalidInputError
 from surfsig.field.signatures import FieldSignatures, extract_field_signatures
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import ProgressCallback
 
 _MOST = 2**32 - 1
 _NEIGHBOURS = 64
@@ -26,6 +27,7 @@ def find_keypoints(
     viewpoint: ArrayLike | None = None,
     normals: ArrayLike | None = None,
     threads: int | None = None,
+    progress: ProgressCallback | None = None,
 ) -> FieldSignatures:
     """Choose places that are distinctive, and spread over the scan.
 
@@ -44,6 +46,9 @@ def find_keypoints(
     spacing
         In place of `count`: the smallest distance between two of them, in the cloud's own unit. All
         candidates are taken, the most distinctive first, that are as far from those before.
+    progress
+        Called with the number of candidates done, and twice their number: each is described, and then
+        compared with the others.
 
     Returns
     -------
@@ -61,14 +66,23 @@ def find_keypoints(
     apart = None if spacing is None else positive_length(spacing, "spacing")
     most = whole_number(KEYPOINTS if count is None else count, "count", _MOST)
     voxel = size / KEYPOINT_CANDIDATES if apart is None else min(apart, size / KEYPOINT_CANDIDATES)
-    found = extract_field_signatures(
-        cloud, size, voxel=voxel, viewpoint=viewpoint, normals=normals, threads=threads
+    tell = progress_callback(progress)
+    candidates = extract_field_signatures(
+        cloud,
+        size,
+        voxel=voxel,
+        viewpoint=viewpoint,
+        normals=normals,
+        threads=threads,
+        progress=None if tell is None else lambda done, total: tell(done, 2 * total),
     )
-    found = found.take(found.ok)
+    found = candidates.take(candidates.ok)
     if not len(found):
         return found
     places = found.points - found.points.mean(axis=0)
     order = np.argsort(-_distinctiveness(found, places, threads), kind="stable")
+    if tell is not None:
+        tell(2 * len(candidates), 2 * len(candidates))
     if apart is not None:
         return found.take(order[_apart(places[order], apart)])
     order = order[: max(most, len(order) // 3)]

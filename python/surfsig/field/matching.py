@@ -7,11 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.arguments import progress_callback, thread_count
 from surfsig.errors import InvalidInputError
 from surfsig.field.signatures import FieldSignatures
+from surfsig.progress import Progress, ProgressCallback
+from surfsig.threads import map_in_threads
 
 _TURNS = 128
 _BLOCK = 2048
+"""Rows that are compared at a time, at most."""
+_MOST_PRODUCTS = 1 << 26
+"""Scalar products that a block has at most: 256 MB."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,7 +43,14 @@ class FieldMatches:
         return f"FieldMatches({len(self)})"
 
 
-def match_fields(source: FieldSignatures, target: FieldSignatures, *, mutual: bool = True) -> FieldMatches:
+def match_fields(
+    source: FieldSignatures,
+    target: FieldSignatures,
+    *,
+    mutual: bool = True,
+    threads: int | None = None,
+    progress: ProgressCallback | None = None,
+) -> FieldMatches:
     """Find for each place of the source the most similar one of the target.
 
     Parameters
@@ -47,6 +60,12 @@ def match_fields(source: FieldSignatures, target: FieldSignatures, *, mutual: bo
         no part.
     mutual
         Whether only matches stay of which each place is the other's most similar.
+    threads
+        Number of threads that search; all cores by default. Within each, NumPy's matrix product may use
+        threads of its own. The result is the same.
+    progress
+        Called with the number of places whose most similar one is known, and of all: those of the source,
+        and with `mutual` those of the target, too.
 
     Returns
     -------
@@ -58,6 +77,8 @@ def match_fields(source: FieldSignatures, target: FieldSignatures, *, mutual: bo
     InvalidInputError
         If the radii differ.
     """
+    workers = thread_count(threads)
+    tell = progress_callback(progress)
     if source.radius != target.radius:
         raise InvalidInputError(
             f"signatures of different radii cannot be matched: {source.radius:g} and {target.radius:g}"
@@ -66,10 +87,11 @@ def match_fields(source: FieldSignatures, target: FieldSignatures, *, mutual: bo
     if not (len(ours) and len(theirs)):
         nothing = np.zeros(0, np.int64)
         return FieldMatches(nothing, nothing, np.zeros(0, np.float32), np.zeros((0, 4, 4)))
-    nearest, similarity = _most_similar(source.vectors[ours], target.vectors[theirs])
+    done = Progress(tell, len(ours) + (len(theirs) if mutual else 0))
+    nearest, similarity = _most_similar(source.vectors[ours], target.vectors[theirs], workers, done)
     kept = np.arange(len(ours))
     if mutual:
-        back, _ = _most_similar(target.vectors[theirs], source.vectors[ours])
+        back, _ = _most_similar(target.vectors[theirs], source.vectors[ours], workers, done)
         kept = kept[back[nearest] == kept]
     kept = kept[np.argsort(-similarity[kept], kind="stable")]
     first, second = ours[kept], theirs[nearest[kept]]
@@ -78,15 +100,18 @@ def match_fields(source: FieldSignatures, target: FieldSignatures, *, mutual: bo
 
 
 def _most_similar(
-    vectors: NDArray[np.float32], among: NDArray[np.float32]
+    vectors: NDArray[np.float32], among: NDArray[np.float32], threads: int | None, done: Progress
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """Find the most similar vector, and the scalar product with it, block by block."""
-    nearest, similarity = np.zeros(len(vectors), np.int64), np.zeros(len(vectors), np.float32)
-    for start in range(0, len(vectors), _BLOCK):
-        block = slice(start, start + _BLOCK)
-        products = vectors[block] @ among.T
-        nearest[block] = products.argmax(axis=1)
-        similarity[block] = products.max(axis=1)
+    rows = min(_BLOCK, max(1, _MOST_PRODUCTS // len(among)))
+    blocks = [vectors[start : start + rows] for start in range(0, len(vectors), rows)]
+
+    def best(block: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        products = block @ among.T
+        return products.argmax(axis=1), products.max(axis=1)
+
+    found = map_in_threads(best, blocks, threads, lambda number, _: done.advance(len(blocks[number - 1])))
+    nearest, similarity = (np.concatenate(column) for column in zip(*found, strict=True))
     return nearest, similarity
 
 

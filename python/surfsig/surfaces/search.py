@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surfsig import _surfsig
-from surfsig.arguments import MOST_NEIGHBORS, positive_length, thread_count, whole_number
+from surfsig.arguments import MOST_NEIGHBORS, positive_length, progress_callback, thread_count, whole_number
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud
 from surfsig.resolution import warn_if_surface_is_lost
@@ -75,7 +75,7 @@ def find_surfaces(
         min_points=None if min_points is None else whole_number(min_points, "min_points", MOST_NEIGHBORS),
         noise=noise,
         threads=threads,
-        progress=progress,
+        progress=progress_callback(progress),
     )
     members = members_of(labels, len(entries))
     found = [
