@@ -30,6 +30,7 @@ def objects_of(scene: RecurrenceScene, found: surfsig.Recurrences, group: int) -
     return [int(np.bincount(scene.object_of_point[part]).argmax()) for part in points]
 
 
+@pytest.mark.slow
 def test_groups_are_the_kinds(scene: RecurrenceScene, found: surfsig.Recurrences) -> None:
     score = scored(scene, found)
     # One bracket shows a side that no other shows: it stays alone.
@@ -38,6 +39,7 @@ def test_groups_are_the_kinds(scene: RecurrenceScene, found: surfsig.Recurrences
     assert len(found) == len(KINDS)
 
 
+@pytest.mark.slow
 def test_poses_of_an_object_without_symmetry(scene: RecurrenceScene, found: surfsig.Recurrences) -> None:
     for number, group in enumerate(found.groups):
         objects = objects_of(scene, found, number)
@@ -54,6 +56,7 @@ def test_poses_of_an_object_without_symmetry(scene: RecurrenceScene, found: surf
     pytest.fail("no group of brackets")
 
 
+@pytest.mark.slow
 def test_a_ball_has_no_orientation(scene: RecurrenceScene, found: surfsig.Recurrences) -> None:
     balls = 0
     for number, group in enumerate(found.groups):
@@ -71,6 +74,7 @@ def test_a_ball_has_no_orientation(scene: RecurrenceScene, found: surfsig.Recurr
     assert balls == 2
 
 
+@pytest.mark.slow
 def test_labels_table_and_words(scene: RecurrenceScene, found: surfsig.Recurrences) -> None:
     (labels,), (groups,) = found.labels, found.group_labels
     assert labels.shape == groups.shape == (len(scene.cloud),)
@@ -130,6 +134,7 @@ def test_unknown_viewpoints_and_other_input(scene: RecurrenceScene) -> None:
         surfsig.find_recurrences(surfsig.find_surfaces(few), min_points=0)
 
 
+@pytest.mark.slow
 def test_without_a_viewpoint_shadows_tell(scene: RecurrenceScene) -> None:
     blind = surfsig.PointCloud(scene.cloud.offsets)
     with pytest.warns(UserWarning, match="where shadows point to"):

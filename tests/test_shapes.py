@@ -75,8 +75,18 @@ ARCS: list[tuple[Callable[..., surfsig.Surface], Draw, float]] = [
 ]
 
 
-@pytest.mark.parametrize("noise", [0.001, 0.01, 0.03])
-@pytest.mark.parametrize(("fit", "draw", "extent"), ARCS)
+QUICK = {(-1.0, 0.01), (0.0, 0.03), (np.pi, 0.01)}
+"""Of the arcs and noises below those whose draws are always made."""
+
+
+@pytest.mark.parametrize(
+    ("fit", "draw", "extent", "noise"),
+    [
+        pytest.param(*arc, noise, marks=() if (arc[2], noise) in QUICK else pytest.mark.slow)
+        for arc in ARCS
+        for noise in (0.001, 0.01, 0.03)
+    ],
+)
 def test_standard_errors_of_radii_are_calibrated(
     fit: Callable[..., surfsig.Surface], draw: Draw, extent: float, noise: float
 ) -> None:
@@ -130,6 +140,7 @@ def test_the_covariance_of_all_values_is_calibrated() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_covariance_of_a_plane_is_calibrated() -> None:
     rng = np.random.default_rng(6)
     found = [fit_plane(plane(rng, 0.01)) for _ in range(DRAWS)]
@@ -160,6 +171,7 @@ def patches_of(points: Array, levels: int) -> NDArray[np.intp]:
     return patches
 
 
+@pytest.mark.slow
 def test_points_that_err_alike_do_not_narrow_the_interval() -> None:
     """The points of a small patch have one error in common: their number says nothing, the blocks do."""
     rng = np.random.default_rng(7)
@@ -174,6 +186,7 @@ def test_points_that_err_alike_do_not_narrow_the_interval() -> None:
     assert 0.9 < np.mean(inside) < 0.99
 
 
+@pytest.mark.slow
 def test_noise_along_the_ray_keeps_the_interval_honest() -> None:
     """A scanner far up errs along z: much at the top of the sphere, hardly at its rim."""
     rng = np.random.default_rng(8)

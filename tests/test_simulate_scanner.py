@@ -201,6 +201,7 @@ def test_a_bump_towards_the_sensor_has_positive_second_derivatives(centre: tuple
     assert cloud.viewpoint[2] == pytest.approx(-0.12 / np.sin(np.radians(25)) / np.cos(np.radians(25)))
 
 
+@pytest.mark.slow
 def test_part_has_its_surfaces_and_curvatures() -> None:
     scene = sim.part_scene()
     cloud = sim.part(3, truth=True)
