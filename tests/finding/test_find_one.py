@@ -1,4 +1,4 @@
-"""One half hidden instance of a model; `test_find.py` has the scenes that take longer."""
+"""One half hidden instance of a model; `tests/test_find.py` has the scenes that take longer."""
 
 import numpy as np
 from finding import errors

@@ -1,4 +1,4 @@
-"""`surfsig library`: models in a file; finding them is in `test_library.py`."""
+"""`surfsig library`: models in a file; finding them is in `tests/test_library.py`."""
 
 from collections.abc import Callable
 from pathlib import Path
