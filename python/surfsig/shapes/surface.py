@@ -123,7 +123,7 @@ class Surface:
 
     @property
     def center_std(self) -> Array:
-        """Standard errors of `center`, (3,), at that place of the axis or the plane; see `point_std`."""
+        """Standard errors of `center`, (3,), there on the axis or the plane; see `point_std`."""
         return self._std_at(self.center - self.point)
 
     @property
