@@ -118,6 +118,7 @@ def test_chosen_radii_are_powers_and_reported() -> None:
     assert "radius" in s.columns()
 
 
+@pytest.mark.slow
 def test_balls_stop_at_an_edge_and_at_the_other_side_of_a_plate() -> None:
     rng = np.random.default_rng(SEED)
     xy = rng.uniform(-10, 10, (40_000, 2))
