@@ -224,6 +224,7 @@ def lidar(rng: np.random.Generator, distance: float) -> Array:
     return np.concatenate(lines)
 
 
+@pytest.mark.slow
 def test_intervals_of_lidar_scans_hold_the_radius_far_more_often_than_naive_ones() -> None:
     rng = np.random.default_rng(15)
     inside, naive = [], []

@@ -181,7 +181,7 @@ def test_seeds() -> None:
     assert (a.points[:, 2] != c.points[:, 2]).mean() > 0.7
 
 
-@pytest.mark.parametrize("centre", [(0.0, 0.0), (0.03, -0.02)])
+@pytest.mark.parametrize("centre", [(0.0, 0.0), pytest.param((0.03, -0.02), marks=pytest.mark.slow)])
 def test_a_bump_towards_the_sensor_has_positive_second_derivatives(centre: tuple[float, float]) -> None:
     radius = 0.03
     cloud = replace(EXACT, column_step=2, sheet_step=2e-4).scan(
