@@ -91,7 +91,8 @@ def test_progress_goes_from_little_to_all(name: str) -> None:
     assert done[0] >= 0
     # Points that no surface explains stay over.
     assert done[-1] == totals[-1] or name == "find_surfaces"
-    assert len(set(totals)) == 1
+    # How many candidates there are is known when they have been chosen.
+    assert len(set(totals)) == 1 or name == "find_keypoints"
 
 
 @pytest.mark.parametrize("name", CALLS)

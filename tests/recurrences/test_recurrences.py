@@ -69,7 +69,7 @@ def test_a_ball_has_no_orientation(scene: RecurrenceScene, found: surfsig.Recurr
             continue
         balls += 1
         (turn,) = group.free_directions
-        assert str(turn).startswith("turns about (")
+        assert str(turn).startswith("rotates about (")
         np.testing.assert_allclose(turn.point, scene.poses[objects[0]][:3, 3], atol=1e-3)
         for pose, member in zip(group.poses, objects, strict=True):
             center = pose @ scene.poses[objects[0]][:, 3]
@@ -151,7 +151,7 @@ def test_two_balls_in_two_scans_are_four_of_a_kind() -> None:
         )
         np.testing.assert_allclose(pose[:3, :3] @ first.center + pose[:3, 3], other.center, atol=5e-3)
     (turn,) = group.free_directions
-    assert str(turn).startswith("turns about (")
+    assert str(turn).startswith("rotates about (")
     (equal,) = found.equal_surfaces
     assert len(equal) == 4
     assert equal.size["radius"] == pytest.approx(0.5, abs=1e-3)

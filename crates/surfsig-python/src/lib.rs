@@ -7,6 +7,8 @@ mod field;
 mod frame;
 mod primitive;
 mod python_file;
+mod registration;
+mod settings;
 mod surface_index;
 mod surfaces;
 
@@ -59,11 +61,13 @@ mod _surfsig {
     #[pymodule_export]
     use crate::extract::{coordinate_steps, extract, voxel_representatives};
     #[pymodule_export]
-    use crate::field::{field_distinctiveness, field_signatures};
+    use crate::field::{field_keypoints, field_signatures, match_fields};
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]
     use crate::primitive::{Primitive, fit_primitive};
+    #[pymodule_export]
+    use crate::registration::{RegistrationSettings, consistent_directions, free_directions, register};
     #[pymodule_export]
     use crate::surface_index::SurfaceIndex;
     #[pymodule_export]

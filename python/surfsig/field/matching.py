@@ -7,17 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig import _surfsig
 from surfsig.arguments import progress_callback, thread_count
 from surfsig.errors import InvalidInputError
 from surfsig.field.signatures import FieldSignatures
 from surfsig.progress import Progress, ProgressCallback
-from surfsig.threads import map_in_threads
 
-_TURNS = 128
-_BLOCK = 2048
-"""Rows that are compared at a time, at most."""
-_MOST_PRODUCTS = 1 << 26
-"""Scalar products that a block has at most: 256 MB."""
+_Float32 = NDArray[np.float32]
+_Places = tuple[NDArray[np.float64], _Float32, _Float32, _Float32, _Float32]
+"""Points, vectors, axes, tangents and phases."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -61,11 +59,10 @@ def match_fields(
     mutual
         Whether only matches stay of which each place is the other's most similar.
     threads
-        Number of threads that search; all cores by default. Within each, NumPy's matrix product may use
-        threads of its own. The result is the same.
+        Number of threads; all cores by default. The result is the same, bit for bit.
     progress
-        Called with the number of places whose most similar one is known, and of all: those of the source,
-        and with `mutual` those of the target, too.
+        Called before and after the search, with the number of places of the source that are matched, and of
+        all.
 
     Returns
     -------
@@ -77,77 +74,29 @@ def match_fields(
     InvalidInputError
         If the radii differ.
     """
-    workers = thread_count(threads)
-    tell = progress_callback(progress)
+    workers, tell = thread_count(threads), progress_callback(progress)
     if source.radius != target.radius:
         raise InvalidInputError(
             f"signatures of different radii cannot be matched: {source.radius:g} and {target.radius:g}"
         )
     ours, theirs = np.flatnonzero(source.ok), np.flatnonzero(target.ok)
-    if not (len(ours) and len(theirs)):
-        nothing = np.zeros(0, np.int64)
-        return FieldMatches(nothing, nothing, np.zeros(0, np.float32), np.zeros((0, 4, 4)))
-    done = Progress(tell, len(ours) + (len(theirs) if mutual else 0))
-    nearest, similarity = _most_similar(source.vectors[ours], target.vectors[theirs], workers, done)
-    kept = np.arange(len(ours))
-    if mutual:
-        back, _ = _most_similar(target.vectors[theirs], source.vectors[ours], workers, done)
-        kept = kept[back[nearest] == kept]
-    kept = kept[np.argsort(-similarity[kept], kind="stable")]
-    first, second = ours[kept], theirs[nearest[kept]]
-    distances = np.sqrt(np.maximum(2.0 - 2.0 * similarity[kept], 0.0)).astype(np.float32)
-    return FieldMatches(first, second, distances, _poses(source.take(first), target.take(second)))
+    done = Progress(tell, len(ours))
+    done.advance(0)
+    found = _surfsig.match_fields(
+        _places(source.take(ours)), _places(target.take(theirs)), mutual=mutual, threads=workers
+    )
+    done.advance(len(ours))
+    return FieldMatches(ours[found["source"]], theirs[found["target"]], found["distances"], found["poses"])
 
 
-def _most_similar(
-    vectors: NDArray[np.float32], among: NDArray[np.float32], threads: int | None, done: Progress
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """Find the most similar vector, and the scalar product with it, block by block."""
-    rows = min(_BLOCK, max(1, _MOST_PRODUCTS // len(among)))
-    blocks = [vectors[start : start + rows] for start in range(0, len(vectors), rows)]
-
-    def best(block: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-        products = block @ among.T
-        return products.argmax(axis=1), products.max(axis=1)
-
-    found = map_in_threads(best, blocks, threads, lambda number, _: done.advance(len(blocks[number - 1])))
-    nearest, similarity = (np.concatenate(column) for column in zip(*found, strict=True))
-    return nearest, similarity
+def _places(fields: FieldSignatures) -> _Places:
+    """Give places as the core takes them."""
+    parts = fields.vectors, fields.axes, fields.tangents, _as_floats(fields.phases)
+    vectors, axes, tangents, phases = (np.ascontiguousarray(part, np.float32) for part in parts)
+    return np.ascontiguousarray(fields.points, np.float64), vectors, axes, tangents, phases
 
 
-def _poses(source: FieldSignatures, target: FieldSignatures) -> NDArray[np.float64]:
-    """T_target_source of pairs of places."""
-    turn = turns(source.phases, target.phases)
-    cosine, sine = np.cos(turn)[:, None], np.sin(turn)[:, None]
-    ours, theirs = _axes(source), _axes(target)
-    x, y, z = theirs[:, 0], theirs[:, 1], theirs[:, 2]
-    turned = np.stack([cosine * x + sine * y, cosine * y - sine * x, z], axis=1)
-    poses = np.tile(np.eye(4), (len(turn), 1, 1))
-    poses[:, :3, :3] = np.einsum("nka,nkb->nab", turned, ours)
-    moved = np.einsum("nab,nb->na", poses[:, :3, :3], source.points)
-    poses[:, :3, 3] = target.points - moved
-    return poses
-
-
-def _axes(fields: FieldSignatures) -> NDArray[np.float64]:
-    """Tangent, the vector square to both, and axis, (n, 3, 3) row by row."""
-    axis, tangent = fields.axes.astype(np.float64), fields.tangents.astype(np.float64)
-    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-    tangent -= np.sum(axis * tangent, axis=1, keepdims=True) * axis
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    return np.stack([tangent, np.cross(axis, tangent), axis], axis=1)
-
-
-def turns(source: NDArray[np.complex64], target: NDArray[np.complex64]) -> NDArray[np.float64]:
-    """Angles (n,) by which sources, (n, 7, 8), must be turned to agree best with targets, in radians."""
-    orders = np.arange(1, source.shape[1] + 1)
-    agreement = np.sum(source.conj() * target, axis=2)
-    angles = 2.0 * np.pi / _TURNS * np.arange(_TURNS)
-    score = (agreement @ np.exp(-1j * np.outer(orders, angles))).real
-    best = score.argmax(axis=1)
-    rows = np.arange(len(best))
-    before, peak, after = (score[rows, (best + step) % _TURNS] for step in (-1, 0, 1))
-    # The vertex of the parabola through the best angle and its neighbours.
-    bow = before - 2.0 * peak + after
-    shift = 0.5 * (before - after) / np.where(bow == 0.0, 1.0, bow)
-    return np.asarray(angles[best] + shift * (2.0 * np.pi / _TURNS))
+def _as_floats(phases: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """Give real and imaginary parts in turn, (n, 112)."""
+    flat = np.ascontiguousarray(phases, np.complex64).view(np.float32)
+    return flat.reshape(len(phases), 2 * phases.shape[1] * phases.shape[2])
