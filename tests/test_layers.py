@@ -47,7 +47,7 @@ RUST_FLOORS = (
     ("geometry", "similarity", "point_cloud", "threads", "moments", "monitor", "status"),
     ("lattice", "resolution", "depth_image", "kd_tree", "voxels"),
     ("simd",),
-    ("cell_index", "surface_index", "tensor", "scan"),
+    ("cell_index", "surface_index", "tensor", "scan", "neighbor_distances"),
     ("ball", "curvature"),
     ("block_sums", "fit", "frame"),
     ("members", "shells", "hierarchy"),

@@ -31,6 +31,7 @@ __all__ = [
     "fit_primitive",
     "free_directions",
     "match_fields",
+    "mean_neighbor_distances",
     "register",
     "voxel_representatives",
     "write_e57",
@@ -193,6 +194,13 @@ def register(
 def free_directions(
     points: NDArray[np.float64], normals: NDArray[np.float64]
 ) -> list[tuple[Literal["rotation", "translation"], list[float] | None, list[float] | None]]: ...
+def mean_neighbor_distances(
+    points: NDArray[np.float64],
+    *,
+    count: int,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> NDArray[np.float64]: ...
 def consistent_directions(
     points: NDArray[np.float64], *, voxel: float, threads: int | None = None
 ) -> NDArray[np.float32]: ...

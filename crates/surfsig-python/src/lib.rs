@@ -5,6 +5,7 @@ mod e57;
 mod extract;
 mod field;
 mod frame;
+mod neighbor_distances;
 mod primitive;
 mod python_file;
 mod registration;
@@ -64,6 +65,8 @@ mod _surfsig {
     use crate::field::{field_keypoints, field_signatures, match_fields};
     #[pymodule_export]
     use crate::frame::Frame;
+    #[pymodule_export]
+    use crate::neighbor_distances::mean_neighbor_distances;
     #[pymodule_export]
     use crate::primitive::{Primitive, fit_primitive};
     #[pymodule_export]
