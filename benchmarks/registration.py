@@ -130,7 +130,7 @@ def ours(title: str, pairs: list[Pair], starts: int, known: bool) -> Row:
     every = starts_of(pairs, starts)
     for pair, each in track(list(zip(pairs, every, strict=True)), description=title, transient=True):
         for start in each:
-            # Not by a product of matrices: the threads of its library keep waiting for more while others are timed.
+            # No product of matrices: the threads of its library wait for more while others are timed.
             moved = np.einsum("ij,nj->ni", start[:3, :3], pair.source) + start[:3, 3]
             eyes = (start[:3, 3], np.zeros(3)) if known else (None, None)
             clouds = PointCloud(moved, viewpoint=eyes[0]), PointCloud(pair.target, viewpoint=eyes[1])
@@ -169,7 +169,10 @@ def row(
     times: tuple[list[float], list[float]],
     trusted: list[bool],
 ) -> Row:
-    """Compare the poses with the truth, pair by pair and start by start; times by the clock and of all threads."""
+    """Compare the poses with the truth, pair by pair and start by start.
+
+    Times are those by the clock, and those of all threads.
+    """
     asked = [(pair, start) for pair, each in zip(pairs, starts, strict=True) for start in each]
     good = np.array([is_right(pose @ start, pair) for pose, (pair, start) in zip(poses, asked, strict=True)])
     sure, count, right = np.array(trusted), len(good), int(good.sum())

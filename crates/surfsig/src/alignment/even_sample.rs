@@ -55,7 +55,7 @@ fn smallest(numbers: Vec<usize>, count: usize, key: impl Fn(usize) -> f64) -> Ve
 
 /// A number above 0 and at most 1 for each of a stream's draws (SplitMix64: Steele, Lea, Flood, Fast splittable
 /// pseudorandom number generators, 2014).
-fn uniform(draw: usize, stream: u64) -> f64 {
+pub(super) fn uniform(draw: usize, stream: u64) -> f64 {
     let mut z = (draw as u64).wrapping_add(stream << 40).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
