@@ -17,6 +17,7 @@
 #ifndef SURFSIG_H
 #define SURFSIG_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
