@@ -67,7 +67,9 @@ def ours(pairs: ScanPairs) -> Vectors:
     """Field signatures; places without one get zeros, like nothing else."""
     vectors = {}
     for name, scan in pairs.scans.items():
-        found = surfsig.field_signatures(scan.points, pairs.radius, at=scan.places, normals=scan.sides)
+        found = surfsig.extract_field_signatures(
+            scan.points, pairs.radius, at=scan.places, normals=scan.sides
+        )
         vectors[name] = np.nan_to_num(found.vectors)
     return vectors
 
@@ -145,7 +147,7 @@ def quality_rows(pairs: ScanPairs, folder: Path) -> list[Row]:
 def speed_row(title: str, scan: Scan, radius: float, folder: Path) -> Row:
     """Time both on all points of a cloud at the same radius."""
     every = Scan(scan.points, scan.sides, np.arange(len(scan.points)))
-    _, spent = times_of(lambda: surfsig.field_signatures(scan.points, radius, normals=scan.sides))
+    _, spent = times_of(lambda: surfsig.extract_field_signatures(scan.points, radius, normals=scan.sides))
     probe = np.arange(0, len(scan.points), max(1, len(scan.points) // 500))
     neighbours = surfsig.extract(scan.points, radius, at=probe).count.mean()
     path = folder / "all.npz"

@@ -91,7 +91,7 @@ def simulated_row(name: str, noise: float, seeds: list[int]) -> Row:
         for copies in (5, 0):
             scene = finding_scene(name, seed, copies=copies, noise=noise)
             start = time.perf_counter()
-            found = surfsig.find(model, scene.cloud)
+            found = surfsig.find_instances(model, scene.cloud)
             seconds.append(time.perf_counter() - start)
             if copies:
                 scores.append(scored(scene, found))
@@ -131,7 +131,7 @@ def real_row(
 ) -> Row:
     """Look for one object in one scene; the true pose is None where it is not there."""
     start = time.perf_counter()
-    found = surfsig.find(model, scene)
+    found = surfsig.find_instances(model, scene)
     seconds = time.perf_counter() - start
     middle = np.eye(4)
     middle[:3, 3] = np.median(model.points[model.finite], axis=0)

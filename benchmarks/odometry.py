@@ -73,7 +73,7 @@ def follow(name: str, lidar: Lidar, count: int) -> Row:
     scene, true = moving_sensor.building(1), moving_sensor.way(count)
     scans = [moving_sensor.scan(scene, pose, seed, lidar) for seed, pose in enumerate(true)]
     start = time.process_time()
-    found = surfsig.odometry(scans)
+    found = surfsig.estimate_odometry(scans)
     seconds = time.process_time() - start
     off, turned = moving_sensor.errors(found.poses, true)
     known = np.flatnonzero(np.isfinite(found.poses).all(axis=(1, 2)))
@@ -110,7 +110,7 @@ def carry_away(seed: int, lidar: Lidar) -> NDArray[np.int64]:
         poses = np.concatenate([walk(rng, true) for _ in range(CARRIED)])
         poses[:, :3, 3] *= scale
         scans = [moving_sensor.scan(scene, pose, 1000 + number, lidar) for number, pose in enumerate(poses)]
-        found = surfsig.odometry([*way, *scans])
+        found = surfsig.estimate_odometry([*way, *scans])
         off, _ = moving_sensor.errors(found.poses, np.concatenate([true, poses]))
         off = off[len(way) :].reshape(CARRIED, STEPS)
         known = np.isfinite(off)

@@ -117,9 +117,9 @@ def main() -> None:
     for seed in options.seeds:
         scene = recurrence_scene(seed, any_way=options.any_way)
         start = time.perf_counter()
-        surfaces = surfsig.surfaces(scene.cloud)
+        surfaces = surfsig.find_surfaces(scene.cloud)
         middle = time.perf_counter()
-        found = surfsig.recurrences(surfaces)
+        found = surfsig.find_recurrences(surfaces)
         end = time.perf_counter()
         score = scored(scene, found)
         print(

@@ -64,9 +64,9 @@ def surfsig_surfaces(cloud: surfsig.PointCloud) -> tuple[Found, float]:
     PeerUnavailable
         When this version of surfsig has no such function.
     """
-    surfaces: Callable[..., Any] | None = getattr(surfsig, "surfaces", None)
+    surfaces: Callable[..., Any] | None = getattr(surfsig, "find_surfaces", None)
     if surfaces is None:
-        raise PeerUnavailable("this version of surfsig has no surfaces()")
+        raise PeerUnavailable("this version of surfsig has no find_surfaces()")
     start = time.process_time()
     found = surfaces(cloud)
     seconds = time.process_time() - start

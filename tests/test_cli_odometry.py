@@ -46,7 +46,7 @@ def test_files_in_any_order_become_a_kitti_file(folder: Path, tmp_path: Path, sh
         "output": str(output), "format": "kitti", "scans": 6,
         "tracked": 5, "relocalised": 0, "lost": 0, "too_few_points": 1,
     }  # fmt: skip
-    expected = surfsig.odometry(folder)
+    expected = surfsig.estimate_odometry(folder)
     np.testing.assert_array_equal(surfsig.read_trajectory(output).poses, expected.poses)
     np.testing.assert_array_equal(np.loadtxt(errors).reshape(-1, 6, 6), expected.covariances)
 
@@ -107,7 +107,7 @@ def test_ctrl_c_leaves_the_old_file(
     def stopped(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("surfsig.odometry", stopped)
+    monkeypatch.setattr("surfsig.estimate_odometry", stopped)
     assert shell("odometry", folder, "-o", output).code == 130
     assert output.read_text() == "old"
     assert list(tmp_path.iterdir()) == [output]

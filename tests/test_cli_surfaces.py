@@ -40,7 +40,7 @@ def test_a_table(shell: Shell, scan: Path) -> None:
 def test_json(shell: Shell, scan: Path, tmp_path: Path) -> None:
     finished = shell("surfaces", scan, "--json", "-")
     values = json.loads(finished.out)
-    expected = surfsig.surfaces(surfsig.read(scan))
+    expected = surfsig.find_surfaces(surfsig.read(scan))
     assert values["points"] == len(expected.cloud)
     assert values["classes"]["sphere"] == expected[2].count
     assert sum(values["classes"].values()) == len(expected.cloud)
@@ -60,7 +60,7 @@ def test_a_labelled_file(shell: Shell, scan: Path, tmp_path: Path, ending: str) 
     output = tmp_path / f"labelled.{ending}"
     assert shell("surfaces", scan, "-o", output).code == 0
     labelled = surfsig.read(output)
-    found = surfsig.surfaces(surfsig.read(scan))
+    found = surfsig.find_surfaces(surfsig.read(scan))
     np.testing.assert_array_equal(labelled.fields["surface"], found.labels)
     np.testing.assert_array_equal(labelled.fields["point_class"], found.classes)
     np.testing.assert_array_equal(labelled.fields["confidence"], found.confidence)
@@ -76,7 +76,7 @@ def test_options_reach_the_search(shell: Shell, scan: Path) -> None:
         shell("surfaces", scan, "--json", "-", "--kinds", "plane,sphere", "--min-points", 2500).out
     )
     cloud = surfsig.read(scan)
-    expected = surfsig.surfaces(cloud, kinds=["plane", "sphere"], min_points=2500)
+    expected = surfsig.find_surfaces(cloud, kinds=["plane", "sphere"], min_points=2500)
     assert [entry["count"] for entry in values["surfaces"]] == [surface.count for surface in expected]
     millimetres = json.loads(shell("surfaces", scan, "--json", "-", "--unit", "mm").out)["surfaces"]
     assert millimetres[2]["radius"] == pytest.approx(0.0003, rel=1e-3)

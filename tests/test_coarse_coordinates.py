@@ -110,12 +110,12 @@ def test_coarse_scans_that_are_registered_are_said() -> None:
 def test_surfaces_and_fits_say_that_the_surface_is_lost() -> None:
     scan = (UTM + sphere(count=2000)).astype(np.float32)
     with pytest.warns(UserWarning, match="steps of 0.5 .*larger than the distance between points"):
-        surfsig.surfaces(scan)
+        surfsig.find_surfaces(scan)
     with pytest.warns(UserWarning, match="the surface is lost in them"):
         surfsig.fit_sphere(scan)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        surfsig.surfaces(sphere(count=2000).astype(np.float32))
+        surfsig.find_surfaces(sphere(count=2000).astype(np.float32))
         assert surfsig.fit_sphere(UTM + sphere(count=2000)).radius == pytest.approx(0.5)
 
 

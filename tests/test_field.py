@@ -53,7 +53,7 @@ def motion(seed: int) -> tuple[Array, Array]:
 def signatures(
     points: Array, at: Array, radius: float = RADIUS, viewpoint: Array = VIEW, **options: Any
 ) -> surfsig.FieldSignatures:
-    return surfsig.field_signatures(points, radius, at=at, viewpoint=viewpoint, **options)
+    return surfsig.extract_field_signatures(points, radius, at=at, viewpoint=viewpoint, **options)
 
 
 def _shares(value: float, bins: int) -> list[tuple[int, float]]:
@@ -135,7 +135,7 @@ def test_unit_and_far_origin_do_not_matter() -> None:
     # A whole number of voxels away, up to rounding at these coordinates.
     shift = np.array([500_000.0, 4_500_000.0, 100.0])
     far = PointCloud(points, origin=shift)
-    moved = surfsig.field_signatures(far, RADIUS, at=at + shift, viewpoint=VIEW + shift)
+    moved = surfsig.extract_field_signatures(far, RADIUS, at=at + shift, viewpoint=VIEW + shift)
     assert np.sum(found.vectors * moved.vectors, axis=1).min() > 0.99
 
 
@@ -201,9 +201,9 @@ def test_an_empty_cloud_and_no_places() -> None:
 def test_normals_of_the_cloud_take_the_viewpoints_place() -> None:
     points, at = surface(), places()
     normals = VIEW - points
-    found = surfsig.field_signatures(points, RADIUS, at=at, normals=normals)
+    found = surfsig.extract_field_signatures(points, RADIUS, at=at, normals=normals)
     np.testing.assert_array_equal(found.vectors, signatures(points, at).vectors)
-    assert not surfsig.field_signatures(points, RADIUS, at=at).oriented
+    assert not surfsig.extract_field_signatures(points, RADIUS, at=at).oriented
 
 
 @pytest.mark.parametrize(
@@ -218,7 +218,7 @@ def test_normals_of_the_cloud_take_the_viewpoints_place() -> None:
 )
 def test_arguments_without_meaning_are_refused(options: dict[str, Any], text: str) -> None:
     with pytest.raises(InvalidInputError, match=text):
-        surfsig.field_signatures(surface(), **options)
+        surfsig.extract_field_signatures(surface(), **options)
 
 
 def test_signatures_of_different_radii_are_not_matched() -> None:

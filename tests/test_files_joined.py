@@ -265,10 +265,10 @@ def test_options_and_progress_are_those_of_all_files(folder: Path) -> None:
 
 
 def test_a_sequence_takes_patterns_and_stays_one(folder: Path) -> None:
-    scans = list(surfsig.scan_sequence(str(folder / "scan_*.ply")))
+    scans = list(surfsig.open_scan_sequence(str(folder / "scan_*.ply")))
     assert [int(scan.cloud.fields["label"][0]) for scan in scans] == [1, 2, 10]
     with pytest.raises(FileNotFoundError, match="no file matches"):
-        surfsig.scan_sequence(folder / "a*.ply")
+        surfsig.open_scan_sequence(folder / "a*.ply")
 
 
 def test_the_command_line_takes_patterns_and_folders(shell: Callable[..., Any], folder: Path) -> None:

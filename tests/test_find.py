@@ -15,7 +15,7 @@ from surfsig.visibility import seen_from
 @pytest.fixture(scope="module")
 def five() -> surfsig.Instances:
     """What is found in a scene of five half hidden copies."""
-    return surfsig.find(whole("figure"), finding_scene("figure", 1).cloud)
+    return surfsig.find_instances(whole("figure"), finding_scene("figure", 1).cloud)
 
 
 def test_five_half_hidden_copies_are_all_found_and_nothing_else(five: surfsig.Instances) -> None:
@@ -44,7 +44,7 @@ def test_instances_say_the_same_in_every_form(five: surfsig.Instances) -> None:
 
 
 def test_what_is_not_there_is_not_found() -> None:
-    found = surfsig.find(whole("figure"), finding_scene("figure", 1, copies=0, others=6).cloud)
+    found = surfsig.find_instances(whole("figure"), finding_scene("figure", 1, copies=0, others=6).cloud)
     assert len(found) == 0
     assert found.summary() == "not there"
     assert (found.labels == -1).all()
@@ -60,7 +60,7 @@ def test_what_is_not_there_is_not_found() -> None:
 def test_real_objects_are_found_once_each(shared_data: Path, name: str, model: str, truth: str) -> None:
     folder = shared_data / "objects" / name
     cloud = surfsig.read(folder / model)
-    found = surfsig.find(cloud, surfsig.read(folder / "scene.pcd"))
+    found = surfsig.find_instances(cloud, surfsig.read(folder / "scene.pcd"))
     assert len(found) == 1
     # The chef's own origin is 0.6 m away from it: errors are those of its middle.
     middle = np.eye(4)
@@ -74,23 +74,23 @@ def test_real_objects_are_not_found_in_each_others_scene(shared_data: Path) -> N
     objects = shared_data / "objects"
     for name, other in (("milk", "chef"), ("chef", "milk")):
         model = surfsig.read(objects / name / f"{name}.pcd")
-        assert len(surfsig.find(model, surfsig.read(objects / other / "scene.pcd"))) == 0
+        assert len(surfsig.find_instances(model, surfsig.read(objects / other / "scene.pcd"))) == 0
 
 
 def test_clutter_is_no_model(shared_data: Path) -> None:
     room = surfsig.read(shared_data / "registration" / "redkitchen" / "cloud_bin_0.ply")
-    assert len(surfsig.find(surfsig.PointCloud(3.0 * whole("figure").points), room)) == 0
+    assert len(surfsig.find_instances(surfsig.PointCloud(3.0 * whole("figure").points), room)) == 0
 
 
 def test_a_box_is_no_bracket() -> None:
     # Where the bracket's faces end, those of a larger box go on.
     scene = finding_scene("bracket with pin", 3, copies=0, others=9)
-    assert len(surfsig.find(whole("bracket with pin"), scene.cloud)) == 0
+    assert len(surfsig.find_instances(whole("bracket with pin"), scene.cloud)) == 0
 
 
 def test_poses_from_noisy_scans_are_as_sure_as_they_say() -> None:
     scene = finding_scene("figure", 1, copies=3, others=0, noise=1e-3)
-    found = surfsig.find(whole("figure"), scene.cloud)
+    found = surfsig.find_instances(whole("figure"), scene.cloud)
     assert scored(scene, found).right == len(found) == 3
     for instance in found.instances:
         true = min(scene.poses, key=lambda pose: errors(instance.T_scene_model, pose))
@@ -102,7 +102,7 @@ def test_poses_from_noisy_scans_are_as_sure_as_they_say() -> None:
 
 
 def test_any_number_of_threads_finds_the_same(five: surfsig.Instances) -> None:
-    alone = surfsig.find(whole("figure"), finding_scene("figure", 1).cloud, threads=1)
+    alone = surfsig.find_instances(whole("figure"), finding_scene("figure", 1).cloud, threads=1)
     for one, other in zip(alone.instances, five.instances, strict=True):
         assert one.score == other.score
         np.testing.assert_array_equal(one.T_scene_model, other.T_scene_model)
@@ -111,7 +111,7 @@ def test_any_number_of_threads_finds_the_same(five: surfsig.Instances) -> None:
 def test_far_away_coordinates_change_nothing() -> None:
     scene, far = finding_scene("figure", 2, copies=1, others=1), np.array([5e5, 5e6, 100.0])
     moved = surfsig.PointCloud(scene.cloud.offsets, origin=far, viewpoint=far)
-    found = surfsig.find(whole("figure"), moved)
+    found = surfsig.find_instances(whole("figure"), moved)
     assert len(found) == 1
     pose = found[0].T_scene_model.copy()
     pose[:3, 3] -= far
@@ -120,7 +120,7 @@ def test_far_away_coordinates_change_nothing() -> None:
 
 def test_a_scene_in_its_sensor_s_axes_needs_no_viewpoint(five: surfsig.Instances) -> None:
     scene = finding_scene("figure", 1)
-    found = surfsig.find(whole("figure"), surfsig.PointCloud(scene.cloud.offsets))
+    found = surfsig.find_instances(whole("figure"), surfsig.PointCloud(scene.cloud.offsets))
     assert [instance.score for instance in found.instances] == [instance.score for instance in five.instances]
 
 
@@ -137,7 +137,7 @@ def test_halves_of_copies_around_the_origin_are_all_found(seed: int) -> None:
         parts.append(half @ pose[:3, :3].T + pose[:3, 3] + rng.normal(0.0, 1e-4, half.shape))
         poses.append(pose)
     floor = np.column_stack([rng.uniform(-0.2, 0.2, (20_000, 2)), np.full(20_000, -0.07)])
-    found = surfsig.find(whole("figure"), np.concatenate([*parts, floor]))
+    found = surfsig.find_instances(whole("figure"), np.concatenate([*parts, floor]))
     score = scored(FindingScene(found.cloud, np.array(poses), np.full(5, 0.5)), found)
     assert (score.right, score.false) == (5, 0)
 
@@ -154,10 +154,10 @@ def test_points_a_million_metres_away_change_nothing() -> None:
     scene, far = finding_scene("figure", 2, copies=1, others=1), [[1e6, -2e6, 1e6]]
     model = surfsig.PointCloud(np.concatenate([whole("figure").points, far]))
     points = np.concatenate([scene.cloud.points, far])
-    found = surfsig.find(model, surfsig.PointCloud(points, viewpoint=scene.cloud.viewpoint))
+    found = surfsig.find_instances(model, surfsig.PointCloud(points, viewpoint=scene.cloud.viewpoint))
     assert len(found) == 1
     # That the points are there is seen in the last digits only.
-    (near,) = surfsig.find(whole("figure"), scene.cloud).instances
+    (near,) = surfsig.find_instances(whole("figure"), scene.cloud).instances
     np.testing.assert_allclose(found[0].T_scene_model, near.T_scene_model, atol=1e-6)
     assert len(points) - 1 not in found[0].indices
 
@@ -165,16 +165,16 @@ def test_points_a_million_metres_away_change_nothing() -> None:
 @pytest.mark.parametrize("score", [0.0, 1.5, np.nan, "much"])
 def test_a_score_without_meaning_is_said(score: float) -> None:
     with pytest.raises(surfsig.InvalidInputError, match="score must be"):
-        surfsig.find(np.zeros((100, 3)), np.zeros((100, 3)), score=score)
+        surfsig.find_instances(np.zeros((100, 3)), np.zeros((100, 3)), score=score)
 
 
 def test_models_without_extent_or_points_are_said() -> None:
     with pytest.raises(surfsig.InvalidInputError, match="50 finite points"):
-        surfsig.find(np.zeros((10, 3)), np.zeros((100, 3)))
+        surfsig.find_instances(np.zeros((10, 3)), np.zeros((100, 3)))
     with pytest.raises(surfsig.InvalidInputError, match="one place"):
-        surfsig.find(np.zeros((100, 3)), np.zeros((100, 3)))
+        surfsig.find_instances(np.zeros((100, 3)), np.zeros((100, 3)))
 
 
 def test_nothing_is_in_an_empty_scene() -> None:
-    assert len(surfsig.find(whole("figure"), np.zeros((0, 3)))) == 0
-    assert len(surfsig.find(whole("figure"), np.zeros((100, 3)))) == 0
+    assert len(surfsig.find_instances(whole("figure"), np.zeros((0, 3)))) == 0
+    assert len(surfsig.find_instances(whole("figure"), np.zeros((100, 3)))) == 0

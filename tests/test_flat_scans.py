@@ -29,13 +29,13 @@ FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     "extract": lambda cloud: surfsig.extract(cloud, 0.1),
     "extract_auto": lambda cloud: surfsig.extract(cloud, "auto"),
     "extract_neighbors": lambda cloud: surfsig.extract(cloud, neighbors=20, robust=True),
-    "surfaces": surfsig.surfaces,
-    "recurrences": lambda cloud: surfsig.recurrences(surfsig.surfaces(cloud)),
-    "keypoints": lambda cloud: surfsig.keypoints(cloud, 0.2),
+    "surfaces": surfsig.find_surfaces,
+    "recurrences": lambda cloud: surfsig.find_recurrences(surfsig.find_surfaces(cloud)),
+    "keypoints": lambda cloud: surfsig.find_keypoints(cloud, 0.2),
     "register": lambda cloud: surfsig.register(cloud, cloud),
     "register_init": lambda cloud: surfsig.register(cloud, cloud, init=np.eye(4)),
-    "find": lambda cloud: surfsig.find(cloud, cloud),
-    "odometry": lambda cloud: surfsig.odometry([cloud, cloud]),
+    "find": lambda cloud: surfsig.find_instances(cloud, cloud),
+    "odometry": lambda cloud: surfsig.estimate_odometry([cloud, cloud]),
     "fit_plane": surfsig.fit_plane,
     "remove_outliers": surfsig.remove_outliers,
     "downsample": lambda cloud: surfsig.downsample(cloud, 0.05),
@@ -54,7 +54,7 @@ def test_a_flat_scan_has_no_curvature_and_is_one_plane() -> None:
     found = surfsig.extract(flat(), 0.1)
     assert found.ok.mean() > 0.9
     np.testing.assert_allclose(found.k1[found.ok], 0.0, atol=1e-5)
-    surfaces = surfsig.surfaces(flat())
+    surfaces = surfsig.find_surfaces(flat())
     assert [surface.kind for surface in surfaces] == ["plane"]
     slides = surfsig.register(flat(), flat(), init=np.eye(4))
     assert len(slides.free_directions) == 3

@@ -141,7 +141,9 @@ def test_axes_across_a_direction_are_unit_square_and_right_handed(raw: Array) ->
 def test_axes_across_are_those_of_the_core() -> None:
     height = np.random.default_rng(4).normal(0.0, 0.05, (400, 1))
     points = np.hstack([np.random.default_rng(5).uniform(-1, 1, (400, 2)), height])
-    found = surfsig.field_signatures(points @ from_rotation_vector(np.ones(3), np.zeros(3))[:3, :3].T, 0.8)
+    found = surfsig.extract_field_signatures(
+        points @ from_rotation_vector(np.ones(3), np.zeros(3))[:3, :3].T, 0.8
+    )
     known = np.isfinite(found.axes).all(axis=1)
     assert known.sum() > 10
     tangents, _ = axes_across(found.axes[known].astype(np.float64))

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 import surfsig
 from surfsig import InvalidInputError, _surfsig
-from surfsig.field.keypoints import _apart, _spread
+from surfsig.field.keypoint_selection import _apart, _spread
 
 Array = NDArray[np.float64]
 
@@ -33,14 +33,14 @@ def scan() -> Array:
 
 
 def test_flat_places_come_last_and_are_not_left_out() -> None:
-    found = surfsig.keypoints(scan(), RADIUS, spacing=RADIUS / 2, viewpoint=VIEW)
+    found = surfsig.find_keypoints(scan(), RADIUS, spacing=RADIUS / 2, viewpoint=VIEW)
     bumpy = found.points[:, 0] > 2.0
     assert bumpy[: bumpy.sum() // 2].mean() > 0.9
     assert (~bumpy).sum() > 0.3 * len(found)
 
 
 def test_spacing_is_kept_and_the_scan_is_covered() -> None:
-    found = surfsig.keypoints(scan(), RADIUS, spacing=0.15, viewpoint=VIEW)
+    found = surfsig.find_keypoints(scan(), RADIUS, spacing=0.15, viewpoint=VIEW)
     tree = cKDTree(found.points)
     assert tree.query(found.points, k=2)[0][:, 1].min() >= 0.15
     # A candidate is as near as the spacing; every point has a candidate within a voxel's diagonal.
@@ -48,7 +48,7 @@ def test_spacing_is_kept_and_the_scan_is_covered() -> None:
 
 
 def test_the_number_is_kept_and_the_bumps_get_them_all_over() -> None:
-    found = surfsig.keypoints(scan(), RADIUS, count=60, viewpoint=VIEW)
+    found = surfsig.find_keypoints(scan(), RADIUS, count=60, viewpoint=VIEW)
     assert len(found) == 60
     assert found.ok.all()
     assert found.indices is not None
@@ -59,7 +59,7 @@ def test_the_number_is_kept_and_the_bumps_get_them_all_over() -> None:
 
 
 def test_where_many_are_asked_for_flat_places_get_some_too() -> None:
-    found = surfsig.keypoints(scan(), RADIUS, count=100_000, viewpoint=VIEW)
+    found = surfsig.find_keypoints(scan(), RADIUS, count=100_000, viewpoint=VIEW)
     assert np.mean(found.points[:, 0] < 2.0 - RADIUS) > 0.3
 
 
@@ -69,9 +69,9 @@ def test_of_keypoints_more_matches_are_right_than_of_random_points() -> None:
     noisy = points[rng.permutation(len(points))[:25_000]] + rng.normal(0.0, 5e-4, (25_000, 3))
     shares = []
     for pair in (
-        [surfsig.keypoints(cloud, RADIUS, count=150, viewpoint=VIEW) for cloud in (points, noisy)],
+        [surfsig.find_keypoints(cloud, RADIUS, count=150, viewpoint=VIEW) for cloud in (points, noisy)],
         [
-            surfsig.field_signatures(
+            surfsig.extract_field_signatures(
                 cloud, RADIUS, at=rng.choice(len(cloud), 150, replace=False), viewpoint=VIEW
             )
             for cloud in (points, noisy)
@@ -96,18 +96,18 @@ def test_places_apart_are_the_first_that_are_free() -> None:
 
 
 def test_nothing_is_chosen_of_nothing() -> None:
-    assert len(surfsig.keypoints(np.zeros((0, 3)), RADIUS)) == 0
+    assert len(surfsig.find_keypoints(np.zeros((0, 3)), RADIUS)) == 0
 
 
 def test_count_and_spacing_exclude_each_other() -> None:
     with pytest.raises(InvalidInputError, match="exclude"):
-        surfsig.keypoints(scan(), RADIUS, count=3, spacing=0.1)
+        surfsig.find_keypoints(scan(), RADIUS, count=3, spacing=0.1)
     with pytest.raises(InvalidInputError, match="count must be"):
-        surfsig.keypoints(scan(), RADIUS, count=0)
+        surfsig.find_keypoints(scan(), RADIUS, count=0)
 
 
 def test_places_near_each_other_do_not_make_each_other_common() -> None:
-    found = surfsig.keypoints(scan(), RADIUS, count=60, viewpoint=VIEW)
+    found = surfsig.find_keypoints(scan(), RADIUS, count=60, viewpoint=VIEW)
     vectors, places = found.vectors, found.points.astype(np.float64)
     given = _surfsig.field_distinctiveness(vectors, places, radius=RADIUS, threads=1)
     apart = np.linalg.norm(places[:, None] - places, axis=2) >= RADIUS

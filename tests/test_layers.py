@@ -16,7 +16,7 @@ Uses = dict[tuple[str, str], set[str]]
 
 PYTHON_FLOORS = (
     ("_surfsig", "errors", "defaults", "digits", "colors", "wkt"),
-    ("geometry", "coordinate_system", "similarity", "flat_atom", "plot"),
+    ("geometry", "coordinate_system", "signature_similarity", "flat_atom", "plot"),
     ("point_cloud",),
     ("arguments", "orientation", "spacing", "units", "missing_returns", "cloud_transforms"),
     ("resolution",),
@@ -42,7 +42,7 @@ PYTHON_EXCEPTIONS = {
 RUST_FLOORS = (
     ("error",),
     ("geometry", "similarity", "point_cloud", "threads", "moments", "monitor", "status"),
-    ("lattice", "resolution", "depth_image"),
+    ("lattice", "resolution", "depth_image", "kd_tree"),
     ("simd",),
     ("cell_index", "surface_index", "tensor"),
     ("ball", "curvature"),
@@ -50,7 +50,7 @@ RUST_FLOORS = (
     ("members", "shells", "hierarchy"),
     ("extract",),
     ("field", "primitive"),
-    ("surfaces",),
+    ("surfaces", "alignment"),
 )
 """Modules of the core, the lowest floor first."""
 

@@ -11,6 +11,7 @@ from finding_scene import finding_scene, whole
 
 import surfsig
 from surfsig import Library
+from surfsig.finding.library import stored_model
 
 
 @pytest.fixture
@@ -25,7 +26,7 @@ def test_what_is_added_comes_back(path: Path) -> None:
     library = Library(path)
     (entry,) = library.list()
     assert (entry.name, entry.unit, entry.points) == ("figure", "m", 12_000)
-    model, prepared = whole("figure"), library.model("figure")
+    model, prepared = whole("figure"), stored_model(library, "figure")
     np.testing.assert_allclose(library.get("figure").points, model.points, atol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(prepared.signatures.vectors, axis=1), 1.0, atol=1e-5)
     assert prepared.radius == entry.radius

@@ -65,16 +65,16 @@ def test_registration_leaves_them_out_and_says_so() -> None:
 
 def test_odometry_leaves_them_out_and_says_so() -> None:
     scans = [scan() + np.array([0.05 * number, 0.0, 0.0]) for number in range(3)]
-    plain = surfsig.odometry(scans)
+    plain = surfsig.estimate_odometry(scans)
     with pytest.warns(UserWarning, match="1800 points of 3 scans are at"):
-        found = surfsig.odometry([with_zeros(points, 600) for points in scans])
+        found = surfsig.estimate_odometry([with_zeros(points, 600) for points in scans])
     np.testing.assert_array_equal(found.poses, plain.poses)
 
 
 def test_finding_leaves_them_out_and_keeps_the_numbers_of_points() -> None:
     scene = with_zeros(scan(), 50)
     with pytest.warns(UserWarning, match="the scene: 50 of 4050"):
-        found = surfsig.find(scan(500), scene)
+        found = surfsig.find_instances(scan(500), scene)
     for instance in found:
         assert not (scene[instance.indices] == 0.0).all(axis=1).any()
 

@@ -42,7 +42,7 @@ def walk() -> Walk:
 
 @pytest.fixture(scope="module")
 def found(walk: Walk) -> Odometry:
-    return surfsig.odometry(walk.scans)
+    return surfsig.estimate_odometry(walk.scans)
 
 
 def test_drift_is_below_two_thousandths_of_the_way(found: Odometry, walk: Walk) -> None:
@@ -70,7 +70,7 @@ def test_covariances_are_as_large_as_the_errors(found: Odometry, walk: Walk) -> 
 
 def test_a_sensor_that_was_carried_away_is_found_again(walk: Walk) -> None:
     carried = [*range(0, 32, 2), 5, 7]
-    result = surfsig.odometry([walk.scans[number] for number in carried])
+    result = surfsig.estimate_odometry([walk.scans[number] for number in carried])
     assert result.status.tolist() == [0] * 16 + [ScanStatus.RELOCALISED, 0]
     off, turned = moving_sensor.errors(result.poses, walk.true[carried])
     assert off.max() < 0.03
@@ -84,18 +84,18 @@ def test_what_no_scan_alone_is_sure_of_waits_for_the_next_ones(
     monkeypatch.setattr(Usual, "is_sure", lambda *_: False)
     carried = [*range(0, 18, 2), 1, 2, 3]
     scans = [walk.scans[number] for number in carried]
-    result = surfsig.odometry(scans)
+    result = surfsig.estimate_odometry(scans)
     assert result.status.tolist() == [0] * 9 + [ScanStatus.RELOCALISED, 0, 0]
     off, _ = moving_sensor.errors(result.poses, walk.true[carried])
     assert off.max() < 0.03
     assert np.isfinite(result.covariances).all()
-    assert surfsig.odometry(scans[:-1]).status.tolist() == [0] * 9 + [ScanStatus.LOST] * 2
+    assert surfsig.estimate_odometry(scans[:-1]).status.tolist() == [0] * 9 + [ScanStatus.LOST] * 2
 
 
 def test_a_building_with_the_same_walls_was_taken_for_the_mapped_one(walk: Walk) -> None:
     other = moving_sensor.building(100)
     away = [moving_sensor.scan(other, walk.true[number], 1000 + number) for number in (3, 4, 12)]
-    result = surfsig.odometry([*walk.scans[:20:2], *away])
+    result = surfsig.estimate_odometry([*walk.scans[:20:2], *away])
     assert result.status.tolist() == [0] * 10 + [ScanStatus.LOST] * 3
 
 
@@ -104,7 +104,7 @@ def test_a_fast_sensor_was_lost_for_good_after_two_scans_of_noise(walk: Walk) ->
     scans, true = walk.scans[:41:4], walk.true[:41:4]
     noise = np.random.default_rng(1).normal(0.0, 2.0, (2, 5000, 3))
     scans[7:9] = [PointCloud(points, viewpoint=np.zeros(3)) for points in noise]
-    result = surfsig.odometry(scans)
+    result = surfsig.estimate_odometry(scans)
     assert result.status.tolist() == [0] * 7 + [ScanStatus.LOST] * 2 + [0] * 2
     off, _ = moving_sensor.errors(result.poses, true)
     assert np.nanmax(off) < 0.02
@@ -119,7 +119,7 @@ def test_something_that_moves_before_the_sensor_does_not_end_the_way(walk: Walk)
         column = simulate.Placed(simulate.Box((0.6, 0.6, 2.0)), simulate.pose(tuple(place)))
         scene = simulate.Scene([*moving_sensor.building().objects, column])
         scans[number] = moving_sensor.scan(scene, pose, number)
-    result = surfsig.odometry(scans)
+    result = surfsig.estimate_odometry(scans)
     assert result.counts()["tracked"] == 16
     off, _ = moving_sensor.errors(result.poses, walk.true[:16])
     assert off.max() < 0.02
@@ -156,7 +156,7 @@ def test_scans_without_a_place_do_not_stop_the_rest(walk: Walk) -> None:
     few = PointCloud(walk.scans[3].points[:49])
     blind = PointCloud(np.concatenate([np.full((500, 3), np.nan), np.full((500, 3), 1e200)]))
     scans = [NOTHING, *walk.scans[:4], NOTHING, walk.scans[5], few, blind, elsewhere, *walk.scans[8:10]]
-    result = surfsig.odometry(scans)
+    result = surfsig.estimate_odometry(scans)
     few_points, lost = ScanStatus.TOO_FEW_POINTS, ScanStatus.LOST
     assert result.status.tolist() == [
         few_points, 0, 0, 0, 0, few_points, 0, few_points, few_points, lost, 0, 0
@@ -169,7 +169,7 @@ def test_scans_without_a_place_do_not_stop_the_rest(walk: Walk) -> None:
 
 
 def test_only_empty_scans() -> None:
-    result = surfsig.odometry([NOTHING, NOTHING])
+    result = surfsig.estimate_odometry([NOTHING, NOTHING])
     assert result.status.tolist() == [ScanStatus.TOO_FEW_POINTS] * 2
     assert np.isnan(result.poses).all()
     assert np.isnan(result.voxel)
@@ -178,19 +178,19 @@ def test_only_empty_scans() -> None:
 
 def test_the_same_for_any_number_of_threads(walk: Walk) -> None:
     scans = [*walk.scans[:12:3], walk.scans[1]]
-    first, second = (surfsig.odometry(scans, threads=threads) for threads in (1, 2))
+    first, second = (surfsig.estimate_odometry(scans, threads=threads) for threads in (1, 2))
     for name in ("poses", "covariances", "status", "overlaps", "voxel"):
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
 def test_unit_and_place_of_the_frame_do_not_matter(walk: Walk) -> None:
     """In millimetres, and the sensor not at 0 of its frame but at a known viewpoint."""
-    plain = surfsig.odometry(walk.scans[:8])
+    plain = surfsig.estimate_odometry(walk.scans[:8])
     shift = np.array([3000.0, -2000.0, 500.0])
     scans = [
         PointCloud(1000.0 * c.points.astype(np.float64) + shift, viewpoint=shift) for c in walk.scans[:8]
     ]
-    result = surfsig.odometry(scans)
+    result = surfsig.estimate_odometry(scans)
     frame = np.eye(4)
     frame[:3, 3] = shift
     expected = plain.poses.copy()
@@ -209,14 +209,14 @@ def test_unit_and_place_of_the_frame_do_not_matter(walk: Walk) -> None:
 
 def test_a_stray_point_far_away_does_not_make_the_voxel(walk: Walk) -> None:
     stray = PointCloud(np.vstack([walk.scans[0].points, [[1e9, 0, 0]]]), viewpoint=np.zeros(3))
-    result = surfsig.odometry([stray, walk.scans[1]])
+    result = surfsig.estimate_odometry([stray, walk.scans[1]])
     assert result.status.tolist() == [0, 0]
-    assert result.voxel == pytest.approx(surfsig.odometry(walk.scans[:1]).voxel, rel=0.05)
+    assert result.voxel == pytest.approx(surfsig.estimate_odometry(walk.scans[:1]).voxel, rel=0.05)
 
 
 def test_a_map_that_is_empty_is_no_new_beginning(walk: Walk) -> None:
     """With no place in the map's range the second scan is lost, not the first of a new way."""
-    result = surfsig.odometry(walk.scans[:2], map_range=0.01)
+    result = surfsig.estimate_odometry(walk.scans[:2], map_range=0.01)
     assert result.status.tolist() == [ScanStatus.TRACKED, ScanStatus.LOST]
 
 
@@ -224,7 +224,7 @@ def test_a_map_that_is_empty_is_no_new_beginning(walk: Walk) -> None:
 def test_scans_in_coordinates_of_a_map_without_a_true_viewpoint(walk: Walk, viewpoint: Array | None) -> None:
     origin = np.array([5e5, 5e6, 100.0])
     scans = [PointCloud(cloud.points, origin=origin, viewpoint=viewpoint) for cloud in walk.scans[:3]]
-    result = surfsig.odometry(scans)
+    result = surfsig.estimate_odometry(scans)
     assert result.status.tolist() == [0, 0, 0]
     frame = np.eye(4)
     frame[:3, 3] = origin
@@ -241,7 +241,9 @@ def test_scans_are_read_one_by_one(walk: Walk) -> None:
             events.append(f"read {number}")
             yield TimedScan(10.5 + number, cloud)
 
-    result = surfsig.odometry(scans(), progress=lambda done, total: events.append(f"{done} of {total}"))
+    result = surfsig.estimate_odometry(
+        scans(), progress=lambda done, total: events.append(f"{done} of {total}")
+    )
     assert events == ["read 0", "1 of 1", "read 1", "2 of 2", "read 2", "3 of 3"]
     assert result.timestamps.tolist() == [10.5, 11.5, 12.5]
 
@@ -250,11 +252,11 @@ def test_mistakes_are_told() -> None:
     cloud = PointCloud(np.random.default_rng(0).normal(size=(100, 3)))
     for name in ("voxel", "distance", "map_range"):
         with pytest.raises(InvalidInputError, match=f"^{name} must be"):
-            surfsig.odometry([cloud], **{name: -1.0})  # type: ignore[arg-type]
+            surfsig.estimate_odometry([cloud], **{name: -1.0})  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="there are no scans"):
-        surfsig.odometry([])
+        surfsig.estimate_odometry([])
     with pytest.raises(InvalidInputError, match="scans must be several"):
-        surfsig.odometry(cloud)  # type: ignore[arg-type]
+        surfsig.estimate_odometry(cloud)  # type: ignore[arg-type]
 
 
 def test_the_map_keeps_the_first_place_of_each_voxel() -> None:

@@ -7,7 +7,7 @@ from surfsig import Frame
 from surfsig.paper.printed import SIDE, TABLE_III
 from surfsig.paper.random_poses import LIBRARY, Way, false_matches, flat_atom, must_differ, self_similarity
 from surfsig.paper.scans import OWN, OWN_HALF, PAPER, scan_and_fit
-from surfsig.similarity import similarity_matrix
+from surfsig.signature_similarity import similarity_matrix
 from surfsig.simulate import Scanner
 
 

@@ -21,7 +21,7 @@ def scene() -> RecurrenceScene:
 @pytest.fixture(scope="module")
 def found(scene: RecurrenceScene) -> surfsig.Recurrences:
     """Find what recurs in it."""
-    return surfsig.recurrences(surfsig.surfaces(scene.cloud))
+    return surfsig.find_recurrences(surfsig.find_surfaces(scene.cloud))
 
 
 def objects_of(scene: RecurrenceScene, found: surfsig.Recurrences, group: int) -> list[int]:
@@ -93,7 +93,7 @@ def test_the_same_scan_twice_and_shifted(scene: RecurrenceScene) -> None:
     other = surfsig.PointCloud(
         one.offsets, origin=shift, fields=one.fields, viewpoints=one.viewpoints + shift
     )
-    found = surfsig.recurrences([surfsig.surfaces(one), surfsig.surfaces(other)])
+    found = surfsig.find_recurrences([surfsig.find_surfaces(one), surfsig.find_surfaces(other)])
     half = len(found.pieces) // 2
     of_scan = [[piece.scan for piece in found.pieces].count(scan) for scan in (0, 1)]
     assert of_scan == [half, half]
@@ -109,12 +109,12 @@ def test_the_same_scan_twice_and_shifted(scene: RecurrenceScene) -> None:
 
 def test_the_same_result_every_time(scene: RecurrenceScene) -> None:
     few = scene.cloud.at(np.flatnonzero(np.isin(scene.object_of_point, range(4))))
-    one, other = (surfsig.recurrences(surfsig.surfaces(few)) for _ in range(2))
+    one, other = (surfsig.find_recurrences(surfsig.find_surfaces(few)) for _ in range(2))
     np.testing.assert_array_equal(one.scores, other.scores)
 
 
 def test_a_scan_without_pieces() -> None:
-    found = surfsig.recurrences(surfsig.surfaces(np.zeros((0, 3))))
+    found = surfsig.find_recurrences(surfsig.find_surfaces(np.zeros((0, 3))))
     assert (len(found), found.pieces, found.equal_surfaces) == (0, [], [])
     assert len(found.to_pandas()) == 0
 
@@ -123,17 +123,17 @@ def test_unknown_viewpoints_and_other_input(scene: RecurrenceScene) -> None:
     few = scene.cloud.at(np.flatnonzero(np.isin(scene.object_of_point, range(4))))
     blind = surfsig.PointCloud(few.offsets)
     with pytest.raises(surfsig.InvalidInputError, match="set the cloud's viewpoint"):
-        surfsig.recurrences(surfsig.surfaces(blind))
+        surfsig.find_recurrences(surfsig.find_surfaces(blind))
     with pytest.raises(surfsig.InvalidInputError, match=r"what surfsig\.surfaces returns"):
-        surfsig.recurrences([few])  # type: ignore[list-item]
+        surfsig.find_recurrences([few])  # type: ignore[list-item]
     with pytest.raises(surfsig.InvalidInputError, match="min_points"):
-        surfsig.recurrences(surfsig.surfaces(few), min_points=0)
+        surfsig.find_recurrences(surfsig.find_surfaces(few), min_points=0)
 
 
 def test_without_a_viewpoint_shadows_tell(scene: RecurrenceScene) -> None:
     blind = surfsig.PointCloud(scene.cloud.offsets)
     with pytest.warns(UserWarning, match="where shadows point to"):
-        found = surfsig.recurrences(surfsig.surfaces(blind))
+        found = surfsig.find_recurrences(surfsig.find_surfaces(blind))
     score = scored(scene, found)
     assert score.rand_index > 0.7
     assert not score.merged

@@ -31,8 +31,8 @@ def test_labels_of_a_program_stand_at_the_finite_points(tmp_path: Path) -> None:
 
 
 def test_surfsig_is_left_out_while_it_finds_no_surfaces(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(surfsig, "surfaces", raising=False)
-    with pytest.raises(PeerUnavailable, match=r"no surfaces\(\)"):
+    monkeypatch.delattr(surfsig, "find_surfaces", raising=False)
+    with pytest.raises(PeerUnavailable, match=r"no find_surfaces\(\)"):
         surfsig_surfaces(surfsig.PointCloud(np.zeros((3, 3))))
 
 
@@ -48,7 +48,7 @@ def test_what_surfsig_finds_is_taken_over(monkeypatch: pytest.MonkeyPatch) -> No
         surfaces: list[Surface]
 
     answer = Surfaces(np.array([1, -1, 0], np.int32), [Surface("plane", None), Surface("cylinder", 2.0)])
-    monkeypatch.setattr(surfsig, "surfaces", lambda cloud: answer, raising=False)
+    monkeypatch.setattr(surfsig, "find_surfaces", lambda cloud: answer, raising=False)
     found, seconds = surfsig_surfaces(surfsig.PointCloud(np.zeros((3, 3))))
     assert found.labels.tolist() == [1, -1, 0]
     assert (found.kinds, found.radii) == (["plane", "cylinder"], [None, 2.0])

@@ -36,11 +36,11 @@ def write_scans(folder: Path, names: list[str]) -> None:
 
 
 def order(paths: Any) -> list[int]:
-    return [int(scan.cloud.points[0, 0]) for scan in surfsig.scan_sequence(paths)]
+    return [int(scan.cloud.points[0, 0]) for scan in surfsig.open_scan_sequence(paths)]
 
 
 def timestamps(paths: Any) -> list[float]:
-    return [scan.timestamp for scan in surfsig.scan_sequence(paths)]
+    return [scan.timestamp for scan in surfsig.open_scan_sequence(paths)]
 
 
 def rows(number: int) -> NDArray[Any]:
@@ -133,13 +133,13 @@ def test_poses_and_times_beside_the_scans_were_taken_for_scans(tmp_path: Path) -
     write_scans(tmp_path, ["0.ply", "1.ply"])
     (tmp_path / "times.txt").write_text("0.0\n0.1\n")
     with pytest.warns(UserWarning, match=r"1 files that are not '\.ply' are left out"):
-        sequence = surfsig.scan_sequence(tmp_path)
+        sequence = surfsig.open_scan_sequence(tmp_path)
     assert [len(scan.cloud) for scan in sequence] == [3, 3]
 
 
 def test_a_file_that_vanishes_ended_the_whole_way(tmp_path: Path) -> None:
     write_scans(tmp_path, ["1.ply", "2.ply", "3.ply"])
-    sequence = surfsig.scan_sequence(tmp_path)
+    sequence = surfsig.open_scan_sequence(tmp_path)
     (tmp_path / "2.ply").unlink()
     with pytest.warns(
         UserWarning, match=r"2\.ply: No such file or directory; taken as a scan without points"
@@ -152,29 +152,29 @@ def test_a_broken_file_is_a_scan_without_points(tmp_path: Path) -> None:
     write_scans(tmp_path, ["1.ply", "3.ply"])
     (tmp_path / "2.ply").write_bytes(b"")
     with pytest.warns(UserWarning, match=r"2\.ply: the file is empty; taken as a scan without points"):
-        clouds = [scan.cloud for scan in surfsig.scan_sequence(tmp_path)]
+        clouds = [scan.cloud for scan in surfsig.open_scan_sequence(tmp_path)]
     assert [len(cloud) for cloud in clouds] == [3, 0, 3]
 
 
 def test_mistakes_are_told_before_anything_is_read(tmp_path: Path) -> None:
     write_scans(tmp_path, ["1.ply"])
     with pytest.raises(FileNotFoundError):
-        surfsig.scan_sequence([tmp_path / "1.ply", tmp_path / "none.ply"])
+        surfsig.open_scan_sequence([tmp_path / "1.ply", tmp_path / "none.ply"])
     with pytest.raises(InvalidInputError, match="there are no scans"):
-        surfsig.scan_sequence([])
+        surfsig.open_scan_sequence([])
     with pytest.raises(InvalidInputError, match=r"1\.ply: is no ROS bag, and so has no topic '/points'"):
-        surfsig.scan_sequence([tmp_path / "1.ply"], topic="/points")
+        surfsig.open_scan_sequence([tmp_path / "1.ply"], topic="/points")
     (tmp_path / "empty").mkdir()
     with pytest.raises(FileFormatError, match="holds no files"):
-        surfsig.scan_sequence(tmp_path / "empty")
+        surfsig.open_scan_sequence(tmp_path / "empty")
     (tmp_path / "alone.mcap").write_bytes(b"")
     with pytest.raises(FileFormatError, match=r"metadata\.yaml is missing"):
-        surfsig.scan_sequence(tmp_path / "alone.mcap")
+        surfsig.open_scan_sequence(tmp_path / "alone.mcap")
 
 
 @pytest.mark.parametrize(("kind", "name"), [("ros1", "a.bag"), ("sqlite3", "a"), ("mcap", "a")])
 def test_the_clouds_of_a_bag(tmp_path: Path, kind: str, name: str) -> None:
-    sequence = surfsig.scan_sequence(write_bag(tmp_path / name, kind))
+    sequence = surfsig.open_scan_sequence(write_bag(tmp_path / name, kind))
     assert len(sequence) == 3
     # As often as they are asked for.
     for _ in range(2):
@@ -195,21 +195,21 @@ def test_the_clouds_of_a_bag(tmp_path: Path, kind: str, name: str) -> None:
 
 def test_a_file_of_a_ros2_bag_stands_for_it(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "bag", "sqlite3")
-    assert len(surfsig.scan_sequence(next(bag.glob("*.db3")))) == 3
+    assert len(surfsig.open_scan_sequence(next(bag.glob("*.db3")))) == 3
 
 
 def test_of_several_topics_one_must_be_named(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "two.bag", "ros1", ("/front", "/rear"))
     with pytest.raises(InvalidInputError, match=r"two\.bag: several topics .* name one of /front, /rear"):
-        surfsig.scan_sequence(bag)
-    assert len(surfsig.scan_sequence(bag, topic="/rear")) == 3
+        surfsig.open_scan_sequence(bag)
+    assert len(surfsig.open_scan_sequence(bag, topic="/rear")) == 3
     with pytest.raises(InvalidInputError, match="under the topic '/chatter', only under /front, /rear"):
-        surfsig.scan_sequence(bag, topic="/chatter")
+        surfsig.open_scan_sequence(bag, topic="/chatter")
     with pytest.raises(InvalidInputError, match="'unit' means nothing for a ROS bag"):
-        surfsig.scan_sequence(bag, topic="/rear", unit="mm")
+        surfsig.open_scan_sequence(bag, topic="/rear", unit="mm")
     silent = write_bag(tmp_path / "silent.bag", "ros1", ())
     with pytest.raises(FileFormatError, match=r"silent\.bag: holds no sensor_msgs"):
-        surfsig.scan_sequence(silent)
+        surfsig.open_scan_sequence(silent)
 
 
 @pytest.mark.parametrize("kind", ["ros1", "sqlite3", "mcap"])
@@ -267,7 +267,7 @@ def test_a_bag_that_is_broken_in_its_middle_ends_there(
     bag = write_bag(tmp_path / "a.bag", "ros1")
     monkeypatch.setattr("surfsig.files.ros_bag.cloud_of", broken)
     with pytest.warns(UserWarning, match=r"a\.bag: broken; its scans end there"):
-        assert len(list(surfsig.scan_sequence(bag))) == 2
+        assert len(list(surfsig.open_scan_sequence(bag))) == 2
 
 
 def test_organised_and_big_endian_clouds() -> None:

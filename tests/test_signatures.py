@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from surface_points import Array, cylinder, paraboloid, plane, rotation, rough_surface, sphere, turn
 
-from surfsig import Extraction, Frame, InvalidInputError, Status, extract, flipped, similarity
+from surfsig import Extraction, Frame, InvalidInputError, Status, extract, flip_signatures, similarity
 
 RADIUS = 0.02
 ABOVE = np.array([0.0, 0.0, 1.0])
@@ -105,8 +105,8 @@ def test_flipped_is_the_signature_seen_from_the_other_side() -> None:
         points = shape.points(rng, RADIUS)
         above, below = on(points).signatures()[0], on(points, viewpoint=-ABOVE).signatures()[0]
         length = float(np.linalg.norm(above))
-        np.testing.assert_allclose(flipped(above), below, atol=2e-4 * length)
-        np.testing.assert_allclose(flipped(flipped(above)), above, atol=0)
+        np.testing.assert_allclose(flip_signatures(above), below, atol=2e-4 * length)
+        np.testing.assert_allclose(flip_signatures(flip_signatures(above)), above, atol=0)
         assert similarity(above, below, either_side=True) > 0.9999
         assert np.linalg.norm(above - below) > 0.1 * length
 
@@ -118,7 +118,7 @@ def test_flat_atom_is_one_more_column_and_tells_flat_from_slightly_curved(rough:
     assert missing.any()
     np.testing.assert_array_equal(np.isnan(with_flat[:, 242]), missing)
     assert (with_flat[~missing, 242] == np.float32(0.25)).all()
-    np.testing.assert_array_equal(flipped(with_flat)[:, 242], with_flat[:, 242].astype(np.float64))
+    np.testing.assert_array_equal(flip_signatures(with_flat)[:, 242], with_flat[:, 242].astype(np.float64))
 
     rng = np.random.default_rng(77)
     flat1, flat2 = (plane().points(rng, RADIUS) + rng.normal(0, 1e-5, (1500, 3)) for _ in range(2))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from surface_points import Array
 
-from surfsig import InvalidInputError, flipped, similarity, similarity_class, similarity_matrix
+from surfsig import InvalidInputError, flip_signatures, similarity, similarity_class, similarity_matrix
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_a_flat_atom_takes_part(rows: Array) -> None:
 
 
 def test_either_side_takes_the_larger_zeta(rows: Array) -> None:
-    other = flipped(rows)
+    other = flip_signatures(rows)
     sides = list(zip(rows, other, strict=True))
     expected = np.array([[max(by_hand(a, b), by_hand(a, c)) for b, c in sides] for a in rows])
     np.testing.assert_allclose(similarity_matrix(rows, rows, either_side=True), expected, atol=1e-12)
@@ -74,7 +74,7 @@ def test_either_side_takes_the_larger_zeta(rows: Array) -> None:
 
 
 def test_flipped_transposes_the_fields_and_inverts_h(rows: Array) -> None:
-    for row, other in zip(rows, flipped(rows), strict=True):
+    for row, other in zip(rows, flip_signatures(rows), strict=True):
         for i in range(11):
             for j in range(11):
                 assert other[11 * i + j] == row[11 * j + i]

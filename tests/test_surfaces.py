@@ -30,7 +30,7 @@ def scene() -> surface_scenes.Known:
 
 @pytest.fixture(scope="module")
 def found(scene: surface_scenes.Known) -> Surfaces:
-    return surfsig.surfaces(scene.points)
+    return surfsig.find_surfaces(scene.points)
 
 
 def test_a_sphere_and_a_pipe_on_a_floor(scene: surface_scenes.Known, found: Surfaces) -> None:
@@ -86,7 +86,7 @@ def test_distances_are_those_of_the_members(scene: surface_scenes.Known, found: 
 
 def test_a_box_has_six_planes() -> None:
     known = surface_scenes.box()
-    found = surfsig.surfaces(known.points)
+    found = surfsig.find_surfaces(known.points)
     assert [surface.kind for surface in found] == ["plane"] * 6
     assert agreement(found, known.owners) > 0.97
     for owner, (axis, sides) in enumerate(
@@ -100,7 +100,7 @@ def test_a_box_has_six_planes() -> None:
 
 @pytest.mark.parametrize("half_angle", [0.3, 0.8])
 def test_a_cone(half_angle: float) -> None:
-    found = surfsig.surfaces(surface_scenes.cone(half_angle))
+    found = surfsig.find_surfaces(surface_scenes.cone(half_angle))
     assert [surface.kind for surface in found] == ["cone"]
     (cone,) = found
     assert cone.half_angle == pytest.approx(half_angle, rel=0.005)
@@ -113,7 +113,7 @@ def test_a_cone(half_angle: float) -> None:
 
 
 def test_a_torus() -> None:
-    found = surfsig.surfaces(surface_scenes.torus(1.0, 0.3))
+    found = surfsig.find_surfaces(surface_scenes.torus(1.0, 0.3))
     assert [surface.kind for surface in found] == ["torus"]
     (torus,) = found
     assert [torus.major_radius, torus.radius] == pytest.approx([1, 0.3], rel=2e-3)
@@ -139,7 +139,7 @@ def test_a_saddle_and_a_free_form() -> None:
     noise = 1e-4 * np.random.default_rng(8).normal(size=x.shape)
     for sign, kind in ((-1, "SADDLE"), (1, "FREE_FORM")):
         bowl = np.column_stack([x, y, 0.3 * (x**2 + sign * 1.7 * y**2 + 0.3 * x**3) + noise])
-        found = surfsig.surfaces(bowl, kinds=["plane"], min_points=2000)
+        found = surfsig.find_surfaces(bowl, kinds=["plane"], min_points=2000)
         assert len(found) == 0
         share = (found.classes == surfsig.PointClass[kind]).mean()
         assert share > 0.9, kind
@@ -148,7 +148,7 @@ def test_a_saddle_and_a_free_form() -> None:
 def test_edges_are_edges() -> None:
     """Of a box without large enough sides, the points at its edges, and few others."""
     known = surface_scenes.box(noise=1e-4)
-    found = surfsig.surfaces(known.points, min_points=100_000, noise=1e-4)
+    found = surfsig.find_surfaces(known.points, min_points=100_000, noise=1e-4)
     assert len(found) == 0
     to_side = np.sort(np.array([1, 0.5, 0.25]) - abs(known.points), axis=1)
     edge = found.classes == surfsig.PointClass.EDGE
@@ -158,7 +158,7 @@ def test_edges_are_edges() -> None:
 
 def test_threads_and_repetition_do_not_matter(scene: surface_scenes.Known, found: Surfaces) -> None:
     for threads in (1, 2):
-        again = surfsig.surfaces(scene.points, threads=threads)
+        again = surfsig.find_surfaces(scene.points, threads=threads)
         np.testing.assert_array_equal(again.labels, found.labels)
         assert [surface.radius for surface in again][1:] == [surface.radius for surface in found][1:]
         np.testing.assert_array_equal(again.confidence, found.confidence)
@@ -166,14 +166,14 @@ def test_threads_and_repetition_do_not_matter(scene: surface_scenes.Known, found
 
 def test_the_order_of_points_hardly_matters(scene: surface_scenes.Known, found: Surfaces) -> None:
     order = np.random.default_rng(9).permutation(len(scene.points))
-    shuffled = surfsig.surfaces(scene.points[order])
+    shuffled = surfsig.find_surfaces(scene.points[order])
     assert [surface.kind for surface in shuffled] == [surface.kind for surface in found]
     assert (shuffled.labels == found.labels[order]).mean() > 0.995
 
 
 def test_a_scan_at_utm_coordinates(scene: surface_scenes.Known, found: Surfaces) -> None:
     turn = rotation(np.random.default_rng(10))
-    far = surfsig.surfaces(PointCloud(scene.points @ turn.T, UTM))
+    far = surfsig.find_surfaces(PointCloud(scene.points @ turn.T, UTM))
     assert [surface.kind for surface in far] == [surface.kind for surface in found]
     assert (far.labels == found.labels).mean() > 0.995
     assert far[2].radius == pytest.approx(found[2].radius, rel=1e-4)
@@ -197,13 +197,13 @@ def test_fields_for_files_and_tables(found: Surfaces) -> None:
 
 
 def test_only_some_kinds(scene: surface_scenes.Known) -> None:
-    assert {surface.kind for surface in surfsig.surfaces(scene.points, kinds=["sphere", "plane"])} <= {
+    assert {surface.kind for surface in surfsig.find_surfaces(scene.points, kinds=["sphere", "plane"])} <= {
         "sphere",
         "plane",
     }
     for wrong in ("ball", [], ["plane", 3]):
         with pytest.raises(InvalidInputError, match="kinds must be"):
-            surfsig.surfaces(scene.points, kinds=wrong)  # type: ignore[arg-type]
+            surfsig.find_surfaces(scene.points, kinds=wrong)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -211,7 +211,7 @@ def test_only_some_kinds(scene: surface_scenes.Known) -> None:
 )
 def test_arguments_without_a_meaning(scene: surface_scenes.Known, wrong: dict[str, float]) -> None:
     with pytest.raises(InvalidInputError, match=next(iter(wrong))):
-        surfsig.surfaces(scene.points, **wrong)  # type: ignore[arg-type]
+        surfsig.find_surfaces(scene.points, **wrong)  # type: ignore[arg-type]
 
 
 def test_the_errors_of_the_core_are_given_on() -> None:
@@ -240,13 +240,13 @@ def test_the_errors_of_the_core_are_given_on() -> None:
 
 def test_kinds_are_tried_the_simplest_first_in_whatever_order_they_are_asked_for() -> None:
     points = surface_scenes.box().points
-    one = surfsig.surfaces(points, kinds=["torus", "plane"])
-    other = surfsig.surfaces(points, kinds=["plane", "torus"])
+    one = surfsig.find_surfaces(points, kinds=["torus", "plane"])
+    other = surfsig.find_surfaces(points, kinds=["plane", "torus"])
     assert {surface.kind for surface in one} == {"plane"}
     np.testing.assert_array_equal(one.labels, other.labels)
 
 
 def test_no_surface_has_fewer_points_than_asked_for() -> None:
-    found = surfsig.surfaces(surface_scenes.box().points, min_points=200)
+    found = surfsig.find_surfaces(surface_scenes.box().points, min_points=200)
     assert all(surface.count >= 200 for surface in found)
     assert (np.bincount(found.labels[found.labels >= 0]) >= 200).all()

@@ -58,7 +58,7 @@ def test_neighbours_err_alike() -> None:
     rays, depth, owner = camera()
     common = gaussian_filter(rng.normal(size=depth.shape), 4)
     noisy = depth + 0.002 * common / common.std() + 0.0005 * rng.normal(size=depth.shape)
-    found = surfsig.surfaces((rays * noisy[..., None]).reshape(-1, 3))
+    found = surfsig.find_surfaces((rays * noisy[..., None]).reshape(-1, 3))
     check(found, owner.ravel(), share=0.9, precision=0.05)
     assert len(found) <= 6
 
@@ -69,7 +69,7 @@ def test_a_sensor_that_measures_in_steps(step: float, jitter: float) -> None:
     rng = np.random.default_rng(SEED)
     rays, depth, owner = camera()
     stepped = 1 / (np.round(1 / depth / step + jitter * rng.normal(size=depth.shape)) * step)
-    found = surfsig.surfaces((rays * stepped[..., None]).reshape(-1, 3))
+    found = surfsig.find_surfaces((rays * stepped[..., None]).reshape(-1, 3))
     check(found, owner.ravel(), share=0.9, precision=0.03)
     assert len(found) <= 6
 
@@ -83,7 +83,7 @@ def test_points_that_were_seen_many_times() -> None:
     depths = depth.ravel()[seen, None] + 0.004 * rng.normal(size=(len(seen), 1))
     depths = depths + 0.0003 * rng.normal(size=(len(seen), times))
     points = rays.reshape(-1, 3)[seen, None] * depths[..., None]
-    found = surfsig.surfaces(points.reshape(-1, 3))
+    found = surfsig.find_surfaces(points.reshape(-1, 3))
     check(found, np.repeat(owner.ravel()[seen], times), share=0.9, precision=0.05)
 
 
@@ -93,7 +93,7 @@ def test_errors_that_are_independent_stay_so() -> None:
     x, y = rng.uniform(0, 1, (2, 20_000))
     upper = x > 0.5
     points = np.column_stack([x, y, 0.005 * upper + 0.001 * rng.normal(size=x.size)])
-    found = surfsig.surfaces(points)
+    found = surfsig.find_surfaces(points)
     assert [surface.kind for surface in found] == ["plane", "plane"]
     assert (found.labels[upper] == found.labels[upper][0]).mean() > 0.97
     assert found.labels[upper][0] != found.labels[~upper][0]

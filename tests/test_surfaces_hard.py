@@ -18,7 +18,7 @@ HARD = {
 
 @pytest.mark.parametrize("name", list(HARD))
 def test_nothing_is_found_where_nothing_is(name: str) -> None:
-    found = surfsig.surfaces(HARD[name])
+    found = surfsig.find_surfaces(HARD[name])
     assert len(found) == 0
     assert (found.labels == -1).all()
     assert "no surface found: " in found.summary()
@@ -31,7 +31,7 @@ def test_nothing_is_found_where_nothing_is(name: str) -> None:
 def test_a_single_plane_is_one_plane() -> None:
     rng = np.random.default_rng(12)
     flat = np.column_stack([rng.uniform(0, 1, (5000, 2)), 0.001 * rng.normal(size=5000)])
-    found = surfsig.surfaces(flat)
+    found = surfsig.find_surfaces(flat)
     assert [surface.kind for surface in found] == ["plane"]
     assert (found.labels == 0).mean() > 0.98
 
@@ -39,7 +39,7 @@ def test_a_single_plane_is_one_plane() -> None:
 def test_points_that_are_not_finite_belong_to_none() -> None:
     points = surface_scenes.on_a_plane().points
     points[::7] = np.nan
-    found = surfsig.surfaces(points)
+    found = surfsig.find_surfaces(points)
     assert [surface.kind for surface in found] == ["plane", "cylinder", "sphere"]
     assert (found.labels[::7] == -1).all()
     assert (found.classes[::7] == surfsig.PointClass.UNKNOWN).all()

@@ -15,14 +15,14 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*the last line .* is cut off:Us
 
 def found_in(path: Path, kind: str, near: float) -> Surface:
     """Give the surface of a kind whose radius is nearest to what is expected."""
-    candidates = [surface for surface in surfsig.surfaces(surfsig.read(path)) if surface.kind == kind]
+    candidates = [surface for surface in surfsig.find_surfaces(surfsig.read(path)) if surface.kind == kind]
     assert candidates
     return min(candidates, key=lambda surface: abs(surface.radius - near))
 
 
 def test_the_mug(shared_data: Path) -> None:
     """PCL fits 0.0396 to it; towards its foot the camera rounds it off, and it has a handle."""
-    found = surfsig.surfaces(surfsig.read(shared_data / "surfaces" / "table_scene_mug.pcd"))
+    found = surfsig.find_surfaces(surfsig.read(shared_data / "surfaces" / "table_scene_mug.pcd"))
     # The largest one is its outside; its inside is another.
     mug = max((each for each in found if each.kind == "cylinder"), key=lambda each: each.count)
     assert mug.radius == pytest.approx(0.0396, abs=0.0025)
@@ -58,7 +58,7 @@ def test_the_gym_ball(shared_data: Path) -> None:
 
 def test_tables_are_not_mixed_nor_in_pieces(shared_data: Path) -> None:
     scenes = read_tables(shared_data)
-    found = [surfsig.surfaces(scene.cloud) for scene in scenes]
+    found = [surfsig.find_surfaces(scene.cloud) for scene in scenes]
     total = TableScore.total(
         score_table(
             scene, Found(each.labels.astype(np.int64), [s.kind for s in each], [s.radius for s in each])
@@ -72,7 +72,7 @@ def test_tables_are_not_mixed_nor_in_pieces(shared_data: Path) -> None:
 def test_equal_cans_have_equal_radii(shared_data: Path) -> None:
     """Two cans stand on one of the tables; nobody says how large they are, but they are of one size."""
     scene = next(each for each in read_tables(shared_data) if each.name == "learn33")
-    found = surfsig.surfaces(scene.cloud)
+    found = surfsig.find_surfaces(scene.cloud)
     cans = []
     for number in (5, 6):
         labels = found.labels[scene.objects == number]
@@ -85,7 +85,7 @@ def test_equal_cans_have_equal_radii(shared_data: Path) -> None:
 
 def test_what_may_be_a_plane_is_no_sphere(shared_data: Path) -> None:
     """Part of the clutter behind the mug was a sphere of radius 0.17 +- 0.15."""
-    found = surfsig.surfaces(surfsig.read(shared_data / "surfaces" / "table_scene_mug.pcd"))
+    found = surfsig.find_surfaces(surfsig.read(shared_data / "surfaces" / "table_scene_mug.pcd"))
     round_ones = [each for each in found if each.kind in ("sphere", "cylinder")]
     assert round_ones
     assert all(each.radius > 2 * each.radius_std for each in round_ones)

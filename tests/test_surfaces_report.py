@@ -31,7 +31,7 @@ def drawn(page: Path) -> str:
 
 @pytest.mark.parametrize("origin", [np.zeros(3), UTM])
 def test_a_browser_draws_the_page(tmp_path: Path, origin: Array) -> None:
-    found = surfsig.surfaces(PointCloud(surface_scenes.on_a_plane().points, origin))
+    found = surfsig.find_surfaces(PointCloud(surface_scenes.on_a_plane().points, origin))
     page = tmp_path / "report.html"
     found.write_report(page, title="a < b & c")
     text = drawn(page)
@@ -54,7 +54,7 @@ def test_a_browser_draws_the_page(tmp_path: Path, origin: Array) -> None:
 def test_the_page_needs_no_network_and_draws_some_points(tmp_path: Path) -> None:
     rng = np.random.default_rng(13)
     flat = np.column_stack([rng.uniform(0, 1, (150_000, 2)), 0.001 * rng.normal(size=150_000)])
-    found = surfsig.surfaces(flat[:100_000])
+    found = surfsig.find_surfaces(flat[:100_000])
     found.write_report(tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert not re.findall(r'<(?:script|link|img)[^>]+(?:src|href)="', text)
@@ -63,7 +63,7 @@ def test_the_page_needs_no_network_and_draws_some_points(tmp_path: Path) -> None
 
 
 def test_a_page_without_surfaces(tmp_path: Path) -> None:
-    surfsig.surfaces(np.full((9, 3), np.nan)).write_report(tmp_path / "report.html")
+    surfsig.find_surfaces(np.full((9, 3), np.nan)).write_report(tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "no surface found: of 9 points none is finite" in text
 
@@ -73,7 +73,7 @@ def test_a_page_without_surfaces(tmp_path: Path) -> None:
 )
 def test_a_click_marks_the_surface(tmp_path: Path, click: str) -> None:
     page = tmp_path / "report.html"
-    surfsig.surfaces(surface_scenes.on_a_plane().points).write_report(page)
+    surfsig.find_surfaces(surface_scenes.on_a_plane().points).write_report(page)
     script = (
         "const places = () => view.data.map(trace => trace.marker.size).join(' ');"
         f"setTimeout(() => {{ {click}; document.title = places(); }}, 2000);"

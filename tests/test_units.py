@@ -65,7 +65,7 @@ def test_finding_names_the_units() -> None:
     scene, model = finding_scene("figure", 2, copies=1, others=1).cloud, whole("figure")
     larger = PointCloud(model.points * 1000.0)
     with pytest.warns(UserWarning, match="nothing was found, and the model 'model' has points .* apart"):
-        assert not len(surfsig.find(larger, scene))
+        assert not len(surfsig.find_instances(larger, scene))
 
 
 def test_comparing_places_names_the_units(shell: Callable[..., Any], tmp_path: Path) -> None:

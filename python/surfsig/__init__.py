@@ -7,45 +7,55 @@ s = surfsig.extract(cloud, radius=0.02)
 s.k1, s.k2, s.normals, s.status            # curvature, per unit length, at every point
 w = s.signatures([100, 2000])              # equal surfaces have equal signatures
 surfsig.similarity(w[0], w[1])             # zeta, between 0 and 1
-way = surfsig.odometry("scans")            # poses of a moving sensor, by its scans
-found = surfsig.surfaces(cloud)            # planes, cylinders, spheres, ... and which points are whose
+found = surfsig.find_surfaces(cloud)       # planes, cylinders, spheres, ... and which points are whose
+odometry = surfsig.estimate_odometry("scans")  # poses of a moving sensor, by its scans
 
 `__version__` is the package's version, `INSTRUCTION_SET` the instructions that its kernels run on here.
 """
 
 from surfsig._surfsig import INSTRUCTION_SET, Frame, __version__
+from surfsig.alignment.free_directions import FreeDirection
 from surfsig.clean import crop, downsample, remove_outliers
-from surfsig.coordinate_system import CoordinateSystem
+from surfsig.coordinate_system import CoordinateSystem, GeoKeys
 from surfsig.curvature import extract, extract_radii
 from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
 from surfsig.extraction import Extraction, FitUsed, Status
-from surfsig.field import FieldMatches, FieldSignatures, field_signatures, keypoints, match_fields
+from surfsig.field import (
+    FieldMatches,
+    FieldSignatures,
+    extract_field_signatures,
+    find_keypoints,
+    match_fields,
+)
 from surfsig.files import (
+    Chunks,
     ScanSequence,
     TimedScan,
     Trajectory,
+    open_scan_sequence,
     read,
     read_trajectory,
-    scan_sequence,
     write,
     write_covariances,
     write_trajectory,
 )
-from surfsig.finding import Instance, Instances, Library, LibraryEntry, find
+from surfsig.finding import Instance, Instances, Library, LibraryEntry, find_instances
 from surfsig.flat_atom import flat_atom_length
 from surfsig.missing_returns import remove_missing_returns
-from surfsig.odometry import Odometry, ScanStatus, odometry
+from surfsig.odometry import Odometry, ScanStatus, estimate_odometry
 from surfsig.point_cloud import PointCloud
-from surfsig.recurrences import Recurrence, Recurrences, recurrences
+from surfsig.recurrences import EqualSurfaces, Piece, Recurrence, Recurrences, find_recurrences
 from surfsig.registration import Registration, register
 from surfsig.shapes import FittedShape, fit_cylinder, fit_plane, fit_sphere
-from surfsig.similarity import flipped, similarity, similarity_class, similarity_matrix
-from surfsig.surfaces import PointClass, Surface, Surfaces, surfaces
+from surfsig.signature_similarity import flip_signatures, similarity, similarity_class, similarity_matrix
+from surfsig.surfaces import PointClass, Surface, Surfaces, find_surfaces
 from surfsig.units import unit_mismatch
 
 __all__ = [
     "INSTRUCTION_SET",
+    "Chunks",
     "CoordinateSystem",
+    "EqualSurfaces",
     "Extraction",
     "FieldMatches",
     "FieldSignatures",
@@ -53,12 +63,15 @@ __all__ = [
     "FitUsed",
     "FittedShape",
     "Frame",
+    "FreeDirection",
+    "GeoKeys",
     "Instance",
     "Instances",
     "InvalidInputError",
     "Library",
     "LibraryEntry",
     "Odometry",
+    "Piece",
     "PointClass",
     "PointCloud",
     "Recurrence",
@@ -75,29 +88,29 @@ __all__ = [
     "__version__",
     "crop",
     "downsample",
+    "estimate_odometry",
     "extract",
+    "extract_field_signatures",
     "extract_radii",
-    "field_signatures",
-    "find",
+    "find_instances",
+    "find_keypoints",
+    "find_recurrences",
+    "find_surfaces",
     "fit_cylinder",
     "fit_plane",
     "fit_sphere",
     "flat_atom_length",
-    "flipped",
-    "keypoints",
+    "flip_signatures",
     "match_fields",
-    "odometry",
+    "open_scan_sequence",
     "read",
     "read_trajectory",
-    "recurrences",
     "register",
     "remove_missing_returns",
     "remove_outliers",
-    "scan_sequence",
     "similarity",
     "similarity_class",
     "similarity_matrix",
-    "surfaces",
     "unit_mismatch",
     "write",
     "write_covariances",

@@ -63,18 +63,46 @@ class GeoKeys:
         return not self._entries()
 
     def numbers(self) -> dict[int, int]:
-        """Give the keys whose value is a whole number."""
+        """Give the keys whose value is a whole number.
+
+        Returns
+        -------
+        dict
+            Values by keys.
+        """
         return {key: value for key, where, _, value in self._entries() if where == 0}
 
     def double(self, key: int) -> float | None:
-        """Give the value of a key that is a number in `doubles`."""
+        """Give the value of a key that is a number in `doubles`.
+
+        Parameters
+        ----------
+        key
+            Its number in GeoTIFF.
+
+        Returns
+        -------
+        float or None
+            None if there is none.
+        """
         for found, where, _, place in self._entries():
             if found == key and where == _DOUBLES and 8 * (place + 1) <= len(self.doubles):
                 return float(struct.unpack_from("<d", self.doubles, 8 * place)[0])
         return None
 
     def words(self, key: int) -> str | None:
-        """Give the value of a key that is a part of `text`; None if there is none, or it is empty."""
+        """Give the value of a key that is a part of `text`.
+
+        Parameters
+        ----------
+        key
+            Its number in GeoTIFF.
+
+        Returns
+        -------
+        str or None
+            None if there is none, or it is empty.
+        """
         for found, where, length, place in self._entries():
             if found == key and where == _TEXT:
                 part = self.text[place : place + length].partition(b"\0")[0]

@@ -60,7 +60,7 @@ RECURRENCE_SEED = 0
 """Of the searches for poses: the same pieces give the same result."""
 
 KEYPOINTS = 1000
-"""Places that `surfsig.keypoints` chooses, where neither number nor distance is asked for."""
+"""Places that `surfsig.find_keypoints` chooses, where neither number nor distance is asked for."""
 
 KEYPOINT_CANDIDATES = 8.0
 """Of them, across a patch's radius, from which it chooses."""

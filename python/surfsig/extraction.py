@@ -18,7 +18,7 @@ from surfsig.defaults import SIGNATURE_BLOCK, Axes
 from surfsig.errors import InvalidInputError
 from surfsig.flat_atom import flat_atom_length
 from surfsig.point_cloud import PointCloud
-from surfsig.similarity import SIGNATURE, similarity
+from surfsig.signature_similarity import SIGNATURE, similarity
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -60,7 +60,7 @@ def remove_missing_returns(cloud: PointCloud | ArrayLike) -> PointCloud:
     """Drop the missing returns of a lidar scan: points at exactly (0, 0, 0), where there are two or more.
 
     Drivers of Ouster, Livox, SICK and other lidars write such points where nothing came back. `register` and
-    `odometry` leave them out by themselves, and so does `remove_outliers`.
+    `estimate_odometry` leave them out by themselves, and so does `remove_outliers`.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ use surfsig::{
     FIELD_PHASES, FIELD_SIGNATURE, FieldOptions, FieldPatches, Monitor, PointCloud, Queries, Radius,
 };
 
-/// Make field signatures; see `surfsig.field_signatures`. With `pools` what the frame sees in place of them.
+/// Make field signatures; see `surfsig.extract_field_signatures`. With `pools` what the frame sees in place of them.
 #[pyfunction]
 #[pyo3(signature = (points, *, origin, radius, at=None, viewpoint=None, directions=None, threads=None, progress=None, pools=false))]
 #[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
@@ -67,7 +67,7 @@ pub fn field_signatures<'py>(
     Ok(arrays)
 }
 
-/// How unlike each place is to the others; see `surfsig.keypoints`.
+/// How unlike each place is to the others; see `surfsig.find_keypoints`.
 #[pyfunction]
 #[pyo3(signature = (vectors, places, *, radius, threads=None))]
 pub fn field_distinctiveness<'py>(

@@ -30,6 +30,7 @@
 //! [`fit_sphere`], [`fit_cylinder`] and [`fit_quadric`] read other surfaces off the same moments, [`fit_primitive`]
 //! fits one by orthogonal distance, and [`find_surfaces`] finds all of a scan.
 
+mod alignment;
 mod ball;
 mod block_sums;
 mod cell_index;
@@ -42,6 +43,7 @@ mod fit;
 mod frame;
 mod geometry;
 mod hierarchy;
+mod kd_tree;
 mod lattice;
 mod members;
 mod moments;
@@ -58,6 +60,7 @@ mod surfaces;
 mod tensor;
 mod threads;
 
+pub use alignment::{GicpCloud, GicpResult, GicpSettings, gicp};
 pub use cell_index::CellIndex;
 pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
 pub use depth_image::{DepthImage, Judgement, SurfacePlace};
@@ -75,6 +78,7 @@ pub use fit::{
 };
 pub use frame::{Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};
 pub use geometry::{RigidTransform, TransformError};
+pub use kd_tree::KdTree;
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use monitor::Monitor;
 pub use point_cloud::{Offsets, PointCloud, Radius};

@@ -42,7 +42,13 @@ class FreeDirection:
         return f"slides along {_text(self.axis)}"
 
     def values(self) -> dict[str, Any]:
-        """Give motion, axis and point as plain numbers; without axis or point where there is none."""
+        """Give motion, axis and point as plain words and numbers, as JSON takes them.
+
+        Returns
+        -------
+        dict
+            motion, axis, point; without axis or point where there is none.
+        """
         known = {"axis": self.axis, "point": self.point}
         return {"motion": self.motion} | {
             name: vector.tolist() for name, vector in known.items() if not np.isnan(vector).any()

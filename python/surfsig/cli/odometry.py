@@ -77,9 +77,9 @@ def odometry_command(
             check_target(target)
     shown = on_terminal() and not quiet
     given = {name: value for name, value in reading.items() if value is not None}
-    sequence = surfsig.scan_sequence(scans, topic=topic, **given)
+    sequence = surfsig.open_scan_sequence(scans, topic=topic, **given)
     with progress_bar("finding poses", "scans", shown=shown) as progress:
-        found = surfsig.odometry(
+        found = surfsig.estimate_odometry(
             sequence,
             voxel=voxel,
             distance=distance,

@@ -85,7 +85,7 @@ def surfaces_command(
         cloud = surfsig.read(file, progress=progress, **reading)
     warn_of_missing_returns(cloud, str(file))
     with progress_bar("finding surfaces", "points", shown=shown) as progress:
-        found = surfsig.surfaces(
+        found = surfsig.find_surfaces(
             cloud,
             min_points=min_points,
             noise=noise,
@@ -98,7 +98,7 @@ def surfaces_command(
     recurring = None
     if recurrences:
         with progress_bar("comparing", "pairs", shown=shown) as progress:
-            recurring = surfsig.recurrences(found, progress=progress)
+            recurring = surfsig.find_recurrences(found, progress=progress)
     if output is not None:
         columns = {**found.columns(), "colors": found.colors}
         if recurring is not None:

@@ -43,7 +43,8 @@ def match_fields(source: FieldSignatures, target: FieldSignatures, *, mutual: bo
     Parameters
     ----------
     source, target
-        From `field_signatures` or `keypoints`, of the same radius. Places without a value take no part.
+        From `extract_field_signatures` or `find_keypoints`, of the same radius. Places without a value take
+        no part.
     mutual
         Whether only matches stay of which each place is the other's most similar.
 

@@ -1,4 +1,4 @@
-"""`field_signatures`, and what it gives."""
+"""`extract_field_signatures`, and what it gives."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class FieldSignatures:
         )
 
 
-def field_signatures(
+def extract_field_signatures(
     cloud: PointCloud | ArrayLike,
     radius: float,
     *,

@@ -21,7 +21,7 @@ from surfsig.files.columns import Chunks, output_columns
 from surfsig.files.paths import Paths, files_meant
 from surfsig.files.progress import Progress, ProgressCallback
 from surfsig.files.read_file import ReadOptions, read_file
-from surfsig.files.sequence import ScanSequence, TimedScan, scan_sequence
+from surfsig.files.sequence import ScanSequence, TimedScan, open_scan_sequence
 from surfsig.files.several import read_several
 from surfsig.files.trajectory import (
     Trajectory,
@@ -39,9 +39,9 @@ __all__ = [
     "Trajectory",
     "check_writable",
     "format_name",
+    "open_scan_sequence",
     "read",
     "read_trajectory",
-    "scan_sequence",
     "trajectory_format",
     "write",
     "write_covariances",

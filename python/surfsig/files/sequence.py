@@ -41,12 +41,7 @@ class ScanSequence:
     A file that cannot be read gives a warning and a scan without points; a bag that is broken in its middle
     gives one and ends there.
 
-    Parameters
-    ----------
-    parts
-        Files, and topics of bags.
-    reading
-        What `surfsig.read` is asked for.
+    `open_scan_sequence` makes it.
     """
 
     def __init__(self, parts: list[Path | BagTopic], reading: dict[str, Any]) -> None:
@@ -78,7 +73,7 @@ class ScanSequence:
             warnings.warn(f"{error}; its scans end there", stacklevel=2)
 
 
-def scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> ScanSequence:
+def open_scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> ScanSequence:
     """Find the scans of a sequence, to be read one by one.
 
     Parameters

@@ -1,4 +1,4 @@
-"""What `find` gives: instances of models, each with its pose."""
+"""What `find_instances` gives: instances of models, each with its pose."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class LibraryEntry(NamedTuple):
 
 
 class Library:
-    """Models in one SQLite file, each with its points and field signatures: `find` opens it and begins.
+    """Models in one SQLite file, each with its points and field signatures: `find_instances` opens it.
 
     A change is made as a whole or not at all, also when the process ends in between; several processes may
     read while one writes.
@@ -95,7 +95,7 @@ class Library:
         name
             One line of text.
         model
-            As `find` takes it.
+            As `find_instances` takes it.
         unit
             Of its coordinates ("m", "mm", ...), for people: nothing is scaled.
         replace
@@ -200,39 +200,8 @@ class Library:
         FileFormatError
             If the file is damaged.
         """
-        model = self.model(name)
+        model = stored_model(self, name)
         return PointCloud(model.points, origin=model.middle)
-
-    def model(self, name: str) -> Model:
-        """Give a model as `find` looks for it: places, normals and signatures.
-
-        Parameters
-        ----------
-        name
-            The model's.
-
-        Returns
-        -------
-        Model
-
-        Raises
-        ------
-        InvalidInputError
-            If there is none of this name.
-        FileFormatError
-            If the file is damaged.
-        """
-        rows: list[tuple[Any, ...]] = []
-        if self.path.exists():
-            with self._opened() as store:
-                query = "SELECT radius, spacing, sided, size, arrays FROM models WHERE name = ?"
-                rows = store.execute(query, (name,)).fetchall()
-        if not rows:
-            raise self._missing(name)
-        try:
-            return _unpacked(*rows[0])
-        except (ValueError, KeyError, TypeError, zlib.error, zipfile.BadZipFile):
-            raise FileFormatError(f"{self.path}: the model {name!r} is damaged") from None
 
     @contextmanager
     def _opened(self, create: bool = False) -> Iterator[sqlite3.Connection]:
@@ -267,6 +236,21 @@ class Library:
 
     def _missing(self, name: str) -> InvalidInputError:
         return InvalidInputError(f"{self.path}: there is no model {name!r}")
+
+
+def stored_model(library: Library, name: str) -> Model:
+    """Give a model of a library as `find_instances` looks for it; errors as of `Library.get`."""
+    rows: list[tuple[Any, ...]] = []
+    if library.path.exists():
+        with library._opened() as store:
+            query = "SELECT radius, spacing, sided, size, arrays FROM models WHERE name = ?"
+            rows = store.execute(query, (name,)).fetchall()
+    if not rows:
+        raise library._missing(name)
+    try:
+        return _unpacked(*rows[0])
+    except (ValueError, KeyError, TypeError, zlib.error, zipfile.BadZipFile):
+        raise FileFormatError(f"{library.path}: the model {name!r} is damaged") from None
 
 
 def _packed(model: Model) -> tuple[bytes, int]:

@@ -12,7 +12,7 @@ from surfsig.arguments import positive_length
 from surfsig.cloud_transforms import about_zero
 from surfsig.curvature import extract
 from surfsig.errors import InvalidInputError
-from surfsig.field import FieldSignatures, field_signatures
+from surfsig.field import FieldSignatures, extract_field_signatures
 from surfsig.one_sided_normals import one_sided_normals
 from surfsig.orientation import orientation
 from surfsig.point_cloud import PointCloud
@@ -41,7 +41,7 @@ FEWEST = 50
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """What `find` looks for, prepared once; coordinates are from `middle`."""
+    """What `find_instances` looks for, prepared once; coordinates are from `middle`."""
 
     points: Array
     """(n, 3), all of them."""
@@ -125,7 +125,9 @@ def described(
     places, facing, _ = surface_places(points, normals, max(radius / _VOXELS, spacing), threads)
     if not len(places):
         raise InvalidInputError("a model's points must lie on a surface: these have no normals")
-    signatures = field_signatures(points, radius, voxel=radius / PLACES, normals=normals, threads=threads)
+    signatures = extract_field_signatures(
+        points, radius, voxel=radius / PLACES, normals=normals, threads=threads
+    )
     return Model(points, middle, spacing, radius, places, facing, signatures.take(signatures.ok), sided)
 
 

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from surfsig._surfsig import DepthImage, SurfaceIndex, SurfacePlaces
 from surfsig.cloud_transforms import about_zero
-from surfsig.field import FieldSignatures, field_signatures
+from surfsig.field import FieldSignatures, extract_field_signatures
 from surfsig.finding.model import PLACES, sides_of, surface_places
 from surfsig.missing_returns import missing_returns
 from surfsig.point_cloud import PointCloud
@@ -75,7 +75,7 @@ class Scene:
     def signatures(self, radius: float) -> FieldSignatures:
         """Describe its places."""
         if radius not in self._signatures:
-            found = field_signatures(
+            found = extract_field_signatures(
                 self.points, radius, voxel=radius / PLACES, normals=self._normals, threads=self.threads
             )
             self._signatures[radius] = found.take(found.ok)

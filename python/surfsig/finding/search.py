@@ -1,4 +1,4 @@
-"""`find`: all instances of models in a scene."""
+"""`find_instances`: all instances of models in a scene."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from surfsig.defaults import INSTANCE_SCORE
 from surfsig.errors import InvalidInputError
 from surfsig.finding.evidence import Evidence, Witness
 from surfsig.finding.instances import Instance, Instances
-from surfsig.finding.library import Library
+from surfsig.finding.library import Library, stored_model
 from surfsig.finding.model import FEWEST, SPACINGS, Model, model_of
 from surfsig.finding.proposals import proposed_poses
 from surfsig.finding.scene import Scene
@@ -67,7 +67,7 @@ class _Candidate:
         return near
 
 
-def find(
+def find_instances(
     model: PointCloud | ArrayLike | Library | Mapping[str, PointCloud | ArrayLike],
     scene: PointCloud | ArrayLike,
     *,
@@ -142,7 +142,7 @@ def find(
 
 def _models(model: object, threads: int | None) -> dict[str, Model]:
     if isinstance(model, Library):
-        return {name: model.model(name) for name in model.names()}
+        return {name: stored_model(model, name) for name in model.names()}
     if isinstance(model, Mapping) and all(isinstance(name, str) for name in model):
         return {name: model_of(data, threads=threads) for name, data in model.items()}
     return {"model": model_of(PointCloud.of(model), threads=threads)}

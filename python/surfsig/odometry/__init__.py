@@ -1,6 +1,6 @@
-"""The way of a sensor through its scans: `odometry`."""
+"""The way of a sensor through its scans: `estimate_odometry`."""
 
 from surfsig.odometry.result import Odometry, ScanStatus
-from surfsig.odometry.search import odometry
+from surfsig.odometry.search import estimate_odometry
 
-__all__ = ["Odometry", "ScanStatus", "odometry"]
+__all__ = ["Odometry", "ScanStatus", "estimate_odometry"]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.alignment.consensus import Pairs, agreed_pose
-from surfsig.field import FieldSignatures, keypoints, match_fields
+from surfsig.field import FieldSignatures, find_keypoints, match_fields
 from surfsig.geometry import inverse, rotation_angle, transform_points
 from surfsig.odometry.alignment import Alignment, Scan, align
 from surfsig.odometry.local_map import LocalMap
@@ -136,4 +136,4 @@ class Keyframes:
     def _described(self, points: NDArray[np.floating]) -> FieldSignatures:
         """Describe a scan's keypoints, as seen from its sensor."""
         cloud = PointCloud(points, viewpoint=np.zeros(3))
-        return keypoints(cloud, self._patch, threads=self._threads)
+        return find_keypoints(cloud, self._patch, threads=self._threads)

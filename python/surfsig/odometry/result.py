@@ -1,4 +1,4 @@
-"""What `odometry` gives."""
+"""What `estimate_odometry` gives."""
 
 from __future__ import annotations
 

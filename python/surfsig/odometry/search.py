@@ -1,4 +1,4 @@
-"""`odometry`: from scans to the way of their sensor."""
+"""`estimate_odometry`: from scans to the way of their sensor."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from surfsig.arguments import positive_length, thread_count
 from surfsig.convert.libraries import library
 from surfsig.errors import InvalidInputError
-from surfsig.files.sequence import ScanSequence, TimedScan, scan_or_empty, scan_sequence
+from surfsig.files.sequence import ScanSequence, TimedScan, open_scan_sequence, scan_or_empty
 from surfsig.odometry.result import Odometry
 from surfsig.point_cloud import PointCloud
 
@@ -25,7 +25,7 @@ Scans = (
 )
 
 
-def odometry(
+def estimate_odometry(
     scans: Scans,
     *,
     voxel: float | None = None,
@@ -44,8 +44,8 @@ def odometry(
     Parameters
     ----------
     scans
-        In the order of time: what `scan_sequence` gives or takes as one path (a folder, a ROS bag), or an
-        iterable of clouds, `TimedScan` or files; they are read one by one. Each is in its sensor's frame,
+        In the order of time: what `open_scan_sequence` gives or takes as one path (a folder, a ROS bag), or
+        an iterable of clouds, `TimedScan` or files; they are read one by one. Each is in its sensor's frame,
         and taken from its viewpoint, where it has one, or from (0, 0, 0); where that is far from all points,
         as in the coordinates of a map, the middle of the first scan stands for it.
     voxel
@@ -93,7 +93,7 @@ def odometry(
 
     way = Way(edge, partners, around, workers)
     if isinstance(scans, (str, os.PathLike)):
-        scans = scan_sequence(scans)
+        scans = open_scan_sequence(scans)
     total = len(scans) if isinstance(scans, Sized) else None
     for number, scan in enumerate(_timed(scans)):
         way.add(scan)

@@ -10,7 +10,7 @@ import numpy as np
 from .._surfsig import GOOD, OPTIMAL
 from ..curvature import extract
 from ..plot import draw_points, view_axes
-from ..similarity import similarity
+from ..signature_similarity import similarity
 from ..simulate import paper_acquisition
 from ..simulate.poses import Array
 from .canvas import BLUE, GREEN, GREY, ORANGE, RED, new_figure

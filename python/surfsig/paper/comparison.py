@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._surfsig import GOOD, Frame
-from ..similarity import similarity_matrix
+from ..signature_similarity import similarity_matrix
 from ..simulate.poses import Array
 from .printed import SIDE, SIMILARITIES, SimilarityTable
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from .._surfsig import GOOD, OPTIMAL, Frame
 from ..defaults import FLAT_ATOM_NOISES
 from ..flat_atom import mean_curvature_noise
-from ..similarity import similarity_matrix
+from ..signature_similarity import similarity_matrix
 from ..simulate import Scanner
 from ..simulate.poses import Array
 from .comparison import REPRODUCTION

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._surfsig import GOOD, OPTIMAL, Frame
-from ..similarity import similarity
+from ..signature_similarity import similarity
 from ..simulate.poses import Array
 from .comparison import (
     OF_NEGATIVES,

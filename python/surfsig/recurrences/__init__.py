@@ -1,8 +1,8 @@
-"""What occurs more than once in scans, without a model: `recurrences`."""
+"""What occurs more than once in scans, without a model: `find_recurrences`."""
 
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.recurrences.equal_surfaces import EqualSurfaces
 from surfsig.recurrences.result import Piece, Recurrence, Recurrences
-from surfsig.recurrences.search import recurrences
+from surfsig.recurrences.search import find_recurrences
 
-__all__ = ["EqualSurfaces", "FreeDirection", "Piece", "Recurrence", "Recurrences", "recurrences"]
+__all__ = ["EqualSurfaces", "FreeDirection", "Piece", "Recurrence", "Recurrences", "find_recurrences"]

@@ -32,6 +32,7 @@ class EqualSurfaces:
     """Surfaces of one kind whose sizes differ by no more than their errors explain."""
 
     kind: str
+    """"sphere", "cylinder", "cone" or "torus"; a plane has no size."""
     size: dict[str, float]
     """Their mean, weighted by their errors: radius, major_radius, half_angle; what the kind has."""
     size_std: dict[str, float]

@@ -1,4 +1,4 @@
-"""From the surfaces of scans to what recurs: `recurrences`."""
+"""From the surfaces of scans to what recurs: `find_recurrences`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _PAIR_UNIT = 0.1
 """Of the pieces' median extent: the distance that counts as much as a radian."""
 
 
-def recurrences(
+def find_recurrences(
     found: Surfaces | Sequence[Surfaces],
     *,
     min_points: int = RECURRENCE_POINTS,
@@ -50,7 +50,7 @@ def recurrences(
     Parameters
     ----------
     found
-        What `surfsig.surfaces` found in a scan, or in several. Their clouds should have a viewpoint (or one
+        What `find_surfaces` found in a scan, or in several. Their clouds should have a viewpoint (or one
         per value of the field ``scan``); without, shadows tell the direction it was in, with a warning.
     min_points
         Fewest points of a piece.
@@ -70,7 +70,7 @@ def recurrences(
     """
     scans = [found] if isinstance(found, Surfaces) else list(found)
     if not all(isinstance(scan, Surfaces) for scan in scans):
-        raise InvalidInputError("found must be what surfsig.surfaces returns, or a list of such")
+        raise InvalidInputError("found must be what surfsig.find_surfaces returns, or a list of such")
     fewest = whole_number(min_points, "min_points", 1 << 40)
     pieces: list[Piece] = []
     views: list[View] = []

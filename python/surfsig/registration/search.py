@@ -14,7 +14,7 @@ from surfsig.alignment.refinement import Refiner
 from surfsig.arguments import positive_length, thread_count, whole_number
 from surfsig.cloud_transforms import about_zero
 from surfsig.defaults import REGISTRATION_KEYPOINTS
-from surfsig.field import FieldSignatures, keypoints, match_fields
+from surfsig.field import FieldSignatures, find_keypoints, match_fields
 from surfsig.geometry import from_translation, pose_array
 from surfsig.missing_returns import without_missing_returns
 from surfsig.one_sided_normals import one_sided_normals
@@ -167,7 +167,7 @@ def _matched(source: PointCloud, target: PointCloud, radius: float, count: int, 
     """Match keypoints; where the side of one scan's surface is not known, both sides of the source."""
 
     def described(cloud: PointCloud, normals: Array | None) -> FieldSignatures:
-        return keypoints(cloud, radius, count=count, normals=normals, threads=threads)
+        return find_keypoints(cloud, radius, count=count, normals=normals, threads=threads)
 
     def one_sided(cloud: PointCloud) -> Array:
         return one_sided_normals(cloud, radius / _SIDE_VOXELS, threads)

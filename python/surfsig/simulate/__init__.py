@@ -15,7 +15,7 @@ from ..geometry import inverse, transform_points
 from .acquisitions import RANDOM_TILT, Acquisition, Jitter, paper_acquisition, paper_acquisitions
 from .ellipsoid import Ellipsoid
 from .height_field import HeightField
-from .part import PART_SCANNER, part, part_scene
+from .machined_part import PART_SCANNER, part, part_scene
 from .poses import UP, facing, pose, turn
 from .scanner import Scanner
 from .scene import Hits, Placed, Scene

@@ -1,4 +1,4 @@
-"""From points to surfaces: `surfaces`."""
+"""From points to surfaces: `find_surfaces`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from surfsig.surfaces.found import Surfaces
 from surfsig.surfaces.surface import KINDS, Kind, described
 
 
-def surfaces(
+def find_surfaces(
     cloud: PointCloud | ArrayLike,
     *,
     min_points: int | None = None,

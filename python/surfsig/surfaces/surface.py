@@ -98,11 +98,10 @@ class Surface:
         numpy.ndarray
             Signed distances (m,): positive outside, or where a plane's normal points.
         """
-        return self.placement.distances(np.asarray(points, np.float64) - self.point)
+        return self._placement.distances(np.asarray(points, np.float64) - self.point)
 
     @property
-    def placement(self) -> Placement:
-        """What distances and places on the surface are measured by."""
+    def _placement(self) -> Placement:
         return Placement(self.kind, self.axis, self.radius, self.major_radius, self.half_angle)
 
     def values(self) -> dict[str, Any]:

@@ -47,7 +47,7 @@ def similarity(a: ArrayLike, b: ArrayLike, *, either_side: bool = False) -> NDAr
         raise InvalidInputError(f"shapes {v1.shape} and {v2.shape} do not broadcast") from None
     zeta = _zeta(dot, _lengths(v1), _lengths(v2))
     if either_side:
-        zeta = np.fmax(zeta, similarity(v1, flipped(v2)))
+        zeta = np.fmax(zeta, similarity(v1, flip_signatures(v2)))
     return zeta if np.ndim(zeta) else float(zeta)
 
 
@@ -75,7 +75,7 @@ def similarity_matrix(a: ArrayLike, b: ArrayLike, *, either_side: bool = False) 
     if v1.ndim != 2 or v2.ndim != 2:
         raise InvalidInputError(f"expected rows of signatures, not the shapes {v1.shape} and {v2.shape}")
     zeta = _zeta(v1 @ v2.T, _lengths(v1)[:, None], _lengths(v2)[None, :])
-    return np.fmax(zeta, similarity_matrix(v1, flipped(v2))) if either_side else zeta
+    return np.fmax(zeta, similarity_matrix(v1, flip_signatures(v2))) if either_side else zeta
 
 
 def similarity_class(zeta: float) -> Literal["optimal", "good", "dissimilar"]:
@@ -102,7 +102,7 @@ def similarity_class(zeta: float) -> Literal["optimal", "good", "dissimilar"]:
     return "good" if zeta >= GOOD else "dissimilar"
 
 
-def flipped(signatures: ArrayLike) -> NDArray[np.float64]:
+def flip_signatures(signatures: ArrayLike) -> NDArray[np.float64]:
     """Return the signatures of the same surfaces seen from their other side.
 
     From there k1 and k2 change places and signs: K stays, H is inverted, and the grid's axes change

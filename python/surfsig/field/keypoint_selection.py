@@ -1,4 +1,4 @@
-"""`keypoints`: places that are worth matching."""
+"""`find_keypoints`: places that are worth matching."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from surfsig import _surfsig
 from surfsig.arguments import positive_length, thread_count, whole_number
 from surfsig.defaults import KEYPOINT_CANDIDATES, KEYPOINTS
 from surfsig.errors import InvalidInputError
-from surfsig.field.signatures import FieldSignatures, field_signatures
+from surfsig.field.signatures import FieldSignatures, extract_field_signatures
 from surfsig.point_cloud import PointCloud
 
 _MOST = 2**32 - 1
 _NEIGHBOURS = 64
 
 
-def keypoints(
+def find_keypoints(
     cloud: PointCloud | ArrayLike,
     radius: float,
     *,
@@ -36,7 +36,7 @@ def keypoints(
     Parameters
     ----------
     cloud, radius, viewpoint, normals, threads
-        As in `field_signatures`.
+        As in `extract_field_signatures`.
     count
         How many, at most; 1,000 by default. Of the most distinctive third of the candidates (of more where
         that is too few) those stay whose distance to the next one that is more distinctive is largest
@@ -61,7 +61,9 @@ def keypoints(
     apart = None if spacing is None else positive_length(spacing, "spacing")
     most = whole_number(KEYPOINTS if count is None else count, "count", _MOST)
     voxel = size / KEYPOINT_CANDIDATES if apart is None else min(apart, size / KEYPOINT_CANDIDATES)
-    found = field_signatures(cloud, size, voxel=voxel, viewpoint=viewpoint, normals=normals, threads=threads)
+    found = extract_field_signatures(
+        cloud, size, voxel=voxel, viewpoint=viewpoint, normals=normals, threads=threads
+    )
     found = found.take(found.ok)
     if not len(found):
         return found
