@@ -48,6 +48,7 @@ mod lattice;
 mod members;
 mod moments;
 mod monitor;
+mod odometry;
 mod point_cloud;
 mod primitive;
 mod resolution;
@@ -59,6 +60,8 @@ mod surface_index;
 mod surfaces;
 mod tensor;
 mod threads;
+mod visibility;
+mod voxel_means;
 
 pub use alignment::{GicpCloud, GicpResult, GicpSettings, gicp};
 pub use cell_index::CellIndex;
@@ -81,6 +84,10 @@ pub use geometry::{RigidTransform, TransformError};
 pub use kd_tree::KdTree;
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use monitor::Monitor;
+pub use odometry::{
+    ExpectationSettings, MapSettings, Odometry, OdometrySettings, PredictionSettings, RelocalisationSettings,
+    ScaleSettings, ScanAlignmentSettings, ScanPose, ScanStatus,
+};
 pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
 pub use resolution::{COARSEST_STEP, Resolution};
@@ -90,3 +97,4 @@ pub use status::Status;
 pub use surface_index::SurfaceIndex;
 pub use surfaces::{FEWEST_SURFACE_POINTS, FoundSurface, FoundSurfaces, SurfaceOptions, find_surfaces};
 pub use threads::with_threads;
+pub use visibility::{RangeImageSettings, SphericalRangeImage, Visibility};

@@ -5,3 +5,4 @@ mod gicp;
 
 pub(crate) use clustered_covariance::{blocks, clustered_covariance};
 pub use gicp::{GicpCloud, GicpResult, GicpSettings, gicp};
+pub(crate) use gicp::{GicpTarget, gicp_with, normal_of};

@@ -34,7 +34,10 @@ impl Correspondences {
         pose: &RigidTransform,
         reach: f64,
     ) -> &[Option<(u32, f64)>] {
-        let of_point = |(point, ((at, nearest), found)): (&[f64; 3], (&mut ([f64; 3], Nearest), &mut Option<(u32, f64)>))| {
+        let of_point = |(point, ((at, nearest), found)): (
+            &[f64; 3],
+            (&mut ([f64; 3], Nearest), &mut Option<(u32, f64)>),
+        )| {
             let moved = pose.transform_point(*point);
             let farthest = nearest.next - squared_distance(&moved, at).sqrt();
             let squared = match nearest.is_some() {
@@ -63,7 +66,9 @@ mod tests {
 
     #[test]
     fn after_any_steps_neighbours_are_those_of_a_new_search() {
-        let number = |i: u64, k: u64| ((i * 3 + k).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11) as f64 / (1_u64 << 53) as f64;
+        let number = |i: u64, k: u64| {
+            ((i * 3 + k).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11) as f64 / (1_u64 << 53) as f64
+        };
         let cloud = |from: u64, count: u64| -> Vec<[f64; 3]> {
             (from..from + count).map(|i| [0, 1, 2].map(|k| 12.0 * number(i, k) - 6.0)).collect()
         };
@@ -74,7 +79,8 @@ mod tests {
         let mut pose = RigidTransform::identity();
         for step in 0..40 {
             let size = 0.5_f64.powi(step % 10);
-            let twist = [0.1, -0.2, 0.1, 0.5, 0.3, -0.4].map(|c| c * size * if step % 3 == 0 { 1.0 } else { -0.7 });
+            let twist =
+                [0.1, -0.2, 0.1, 0.5, 0.3, -0.4].map(|c| c * size * if step % 3 == 0 { 1.0 } else { -0.7 });
             pose = pose * RigidTransform::exp(twist);
             for (point, found) in points.iter().zip(correspondences.update(&map, &points, &pose, 2.0)) {
                 let nearest = map.nearest(pose.transform_point(*point), 2.0);

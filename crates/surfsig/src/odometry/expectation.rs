@@ -23,7 +23,9 @@ impl Expectation {
     /// Takes a scan that has a pose.
     pub fn add(&mut self, found: &ScanAlignment) {
         let values = [found.overlap, found.free_space, found.unexplained];
-        for (last, value) in [&mut self.overlaps, &mut self.free_space, &mut self.unexplained].into_iter().zip(values) {
+        for (last, value) in
+            [&mut self.overlaps, &mut self.free_space, &mut self.unexplained].into_iter().zip(values)
+        {
             last.push_back(value);
             if last.len() > self.settings.scans {
                 last.pop_front();

@@ -24,8 +24,12 @@ impl Scale {
         let middle = median_point(points);
         let spread = distances(points, middle);
         let largest = quantile(&mut spread.clone(), settings.central_share);
-        let central: Vec<[f64; 3]> =
-            points.iter().zip(&spread).filter(|(_, distance)| **distance <= largest).map(|(point, _)| *point).collect();
+        let central: Vec<[f64; 3]> = points
+            .iter()
+            .zip(&spread)
+            .filter(|(_, distance)| **distance <= largest)
+            .map(|(point, _)| *point)
+            .collect();
         Self {
             voxel: voxel.unwrap_or_else(|| edge_of_voxels(&central, settings)),
             median_range: median(&mut distances(points, [0.0; 3])),
@@ -78,8 +82,11 @@ mod tests {
 
     #[test]
     fn a_scan_fills_as_many_voxels_as_were_asked_for() {
-        let number = |i: u64, k: u64| ((i * 3 + k).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11) as f64 / (1_u64 << 53) as f64;
-        let points: Vec<[f64; 3]> = (0..50_000).map(|i| [10.0 * number(i, 0), 7.0 * number(i, 1), 0.0]).collect();
+        let number = |i: u64, k: u64| {
+            ((i * 3 + k).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let points: Vec<[f64; 3]> =
+            (0..50_000).map(|i| [10.0 * number(i, 0), 7.0 * number(i, 1), 0.0]).collect();
         let settings = ScaleSettings::default();
         for (count, expected) in [(points.len(), 4000.0), (1000, 800.0)] {
             let scale = Scale::new(&points[..count], None, &settings);

@@ -5,8 +5,8 @@ use super::local_map::LocalMap;
 use super::scan::Scan;
 use super::settings::ScanAlignmentSettings;
 use super::statistics::median;
-use crate::alignment::{GicpSettings, blocks, clustered_covariance, gicp};
 use crate::RigidTransform;
+use crate::alignment::{GicpSettings, blocks, clustered_covariance, gicp_with};
 use nalgebra::{Matrix6, SymmetricEigen, Vector3, Vector6};
 use std::collections::BTreeMap;
 
@@ -49,9 +49,13 @@ pub(super) fn align<F: Fn([f64; 3]) -> bool>(
     let mut pose = start;
     for max_correspondence_distance in [max_distance, max_distance.min(settings.max_point_distance)] {
         let &ScanAlignmentSettings { max_iterations, rotation_epsilon, translation_epsilon, .. } = settings;
-        let round =
-            GicpSettings { max_correspondence_distance, max_iterations, rotation_epsilon, translation_epsilon };
-        let found = gicp(map, &scan.coarse, pose, &round);
+        let round = GicpSettings {
+            max_correspondence_distance,
+            max_iterations,
+            rotation_epsilon,
+            translation_epsilon,
+        };
+        let found = gicp_with(map, &scan.coarse, pose, &round);
         if found.inliers < settings.min_correspondences {
             return None;
         }

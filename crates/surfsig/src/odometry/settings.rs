@@ -1,7 +1,7 @@
 //! All that odometry is told: each number once, with its unit, its meaning and its reason.
 
-use crate::visibility::RangeImageSettings;
 use crate::Error;
+use crate::visibility::RangeImageSettings;
 
 /// How [`crate::Odometry`] works. Nothing has to be set.
 ///
@@ -156,7 +156,7 @@ impl Default for ScanAlignmentSettings {
             rotation_epsilon: 1e-3,
             translation_epsilon: 1e-2,
             coarse_voxel: 2.0,
-            plane_steps: 2,
+            plane_steps: 1,
             max_point_distance: 2.0,
             max_residual: 0.5,
             max_deviation: 3.0,

@@ -170,7 +170,8 @@ mod tests {
     }
 
     fn by_brute_force(points: &[[f64; 3]], at: [f64; 3]) -> Vec<(f64, u32)> {
-        let mut all: Vec<(f64, u32)> = points.iter().map(|point| squared_distance(point, &at)).zip(0..).collect();
+        let mut all: Vec<(f64, u32)> =
+            points.iter().map(|point| squared_distance(point, &at)).zip(0..).collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         all
     }
@@ -206,7 +207,10 @@ mod tests {
         let far = [[1e300, -1e300, 0.0], [3e9, 0.0, 0.0], [-3e9, 0.0, f64::INFINITY]];
         let (index, points) = index_of(far.to_vec());
         assert_eq!(points.len(), 3);
-        assert!(index.nearest(&points, [0.0; 3], 16.0) == Nearest { index: u32::MAX, squared: f64::INFINITY, next: 16.0 });
+        assert!(
+            index.nearest(&points, [0.0; 3], 16.0)
+                == Nearest { index: u32::MAX, squared: f64::INFINITY, next: 16.0 }
+        );
         let mut found = Vec::new();
         for at in far {
             index.nearest_k(&points, at, 5, &mut found);

@@ -215,10 +215,11 @@ mod tests {
 
     /// Directions that are in no two pixels by rounding.
     fn points() -> impl Strategy<Value = Vec<[f64; 3]>> {
-        let point = (-1.49_f64..1.49, -3.1_f64..3.1, 5.0_f64..40.0).prop_map(|(elevation, azimuth, range)| {
-            let flat = range * elevation.cos();
-            [flat * azimuth.cos(), flat * azimuth.sin(), range * elevation.sin()]
-        });
+        let point =
+            (-1.49_f64..1.49, -3.1_f64..3.1, 5.0_f64..40.0).prop_map(|(elevation, azimuth, range)| {
+                let flat = range * elevation.cos();
+                [flat * azimuth.cos(), flat * azimuth.sin(), range * elevation.sin()]
+            });
         prop::collection::vec(point, 1..200)
     }
 
@@ -252,7 +253,8 @@ mod tests {
     #[test]
     fn points_without_a_direction_are_no_error() {
         let odd = [[0.0; 3], [f64::NAN; 3], [f64::INFINITY, 0.0, 0.0], [0.0, 0.0, -0.0]];
-        let image = SphericalRangeImage::new(&odd, RangeImageSettings { pixel: f64::NAN, ..Default::default() });
+        let image =
+            SphericalRangeImage::new(&odd, RangeImageSettings { pixel: f64::NAN, ..Default::default() });
         assert!(odd.iter().all(|point| image.visibility(*point) == Visibility::Unmeasured));
         assert_eq!(image.free_space_share(odd), 0.0);
     }

@@ -1,0 +1,119 @@
+//! Scans that are kept, to find a sensor again that was lost.
+
+use super::local_map::LocalMap;
+use super::scan::Scan;
+use super::scan_alignment::{ScanAlignment, align};
+use super::settings::OdometrySettings;
+use super::tracker::rotation_angle;
+use crate::RigidTransform;
+use crate::visibility::SphericalRangeImage;
+
+/// A scan that is kept; lengths are in voxels.
+#[allow(non_snake_case)]
+struct Keyframe {
+    number: u32,
+    T_map_scan: RigidTransform,
+    /// The mean of each voxel's points.
+    points: Vec<[f32; 3]>,
+    /// Those of smaller voxels, for the signatures.
+    detail: Vec<[f32; 3]>,
+    range_image: SphericalRangeImage,
+}
+
+/// The keyframes of a sequence, one for each viewpoint and direction.
+pub(super) struct Keyframes {
+    settings: OdometrySettings,
+    median_range: f64,
+    patch_radius: f64,
+    kept: Vec<Keyframe>,
+}
+
+impl Keyframes {
+    pub fn new(settings: &OdometrySettings, median_range: f64, patch_radius: f64) -> Self {
+        Self { settings: settings.clone(), median_range, patch_radius, kept: Vec::new() }
+    }
+
+    /// Keeps a scan, unless there is one of nearly the same pose.
+    pub fn offer(&mut self, scan: &Scan, pose: &RigidTransform, number: u32) {
+        let settings = &self.settings.relocalisation;
+        let to_scan = pose.inverse();
+        let is_alike = |other: &Keyframe| {
+            let between = to_scan * other.T_map_scan;
+            between.translation.norm() < settings.keyframe_distance * self.median_range
+                && rotation_angle(&between) < settings.keyframe_rotation
+        };
+        if self.kept.iter().rev().any(is_alike) {
+            return;
+        }
+        self.kept.push(Keyframe {
+            number,
+            T_map_scan: *pose,
+            points: in_float32(&scan.points),
+            detail: in_float32(&scan.means(settings.detail_voxel)),
+            range_image: scan.range_image.clone(),
+        });
+    }
+
+    /// Tells which points of a scan at a pose the keyframes next to it would have measured.
+    pub fn would_have_seen(&self, pose: &RigidTransform) -> impl Fn([f64; 3]) -> bool + use<'_> {
+        let distance = |other: &Keyframe| (other.T_map_scan.translation - pose.translation).norm();
+        let mut near: Vec<&Keyframe> = self.kept.iter().collect();
+        near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        near.truncate(self.settings.relocalisation.observers);
+        let observers: Vec<(RigidTransform, &SphericalRangeImage)> =
+            near.iter().map(|other| (other.T_map_scan.inverse() * *pose, &other.range_image)).collect();
+        move |point| {
+            observers
+                .iter()
+                .any(|(transform, image)| image.visibility(transform.transform_point(point)).is_in_sight())
+        }
+    }
+
+    /// Of the poses that matches propose, the one that lies best on the map of the keyframes around it, and that map.
+    pub fn find(
+        &mut self,
+        scan: &Scan,
+        map_range: f64,
+        is_believed: impl Fn(&ScanAlignment) -> bool,
+    ) -> Option<(ScanAlignment, LocalMap)> {
+        let mut best: Option<(ScanAlignment, LocalMap)> = None;
+        let settings = &self.settings.relocalisation;
+        let distance = settings.max_correspondence_distance;
+        for pose in self.proposals(scan) {
+            let map = self.submap(pose.translation.into(), map_range);
+            let known = |pose: &RigidTransform| self.would_have_seen(pose);
+            let Some(found) = align(scan, &map, pose, distance, &self.settings.alignment, known) else {
+                continue;
+            };
+            let is_better = best.as_ref().is_none_or(|(other, _)| found.overlap > other.overlap);
+            if is_better && is_believed(&found) {
+                best = Some((found, map));
+            }
+        }
+        best
+    }
+
+    fn proposals(&self, _scan: &Scan) -> Vec<RigidTransform> {
+        let _ = self.patch_radius;
+        self.kept.iter().map(|k| &k.detail).for_each(drop);
+        Vec::new()
+    }
+
+    /// The map of the keyframes taken within a distance of a point.
+    fn submap(&self, center: [f64; 3], distance: f64) -> LocalMap {
+        let mut map = LocalMap::new(&self.settings.map);
+        for keyframe in &self.kept {
+            let from: [f64; 3] = keyframe.T_map_scan.translation.into();
+            if super::voxel_index::squared_distance(&from, &center) <= distance * distance {
+                let moved = |point: &[f32; 3]| keyframe.T_map_scan.transform_point(point.map(f64::from));
+                map.add(keyframe.points.iter().map(moved), keyframe.number);
+            }
+        }
+        map.keep_within(center, distance, 0.0);
+        map
+    }
+}
+
+fn in_float32(points: &[[f64; 3]]) -> Vec<[f32; 3]> {
+    points.iter().map(|point| point.map(|c| c as f32)).collect()
+}
