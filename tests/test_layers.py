@@ -42,15 +42,16 @@ PYTHON_EXCEPTIONS = {
 RUST_FLOORS = (
     ("error",),
     ("geometry", "similarity", "point_cloud", "threads", "moments", "monitor", "status"),
-    ("lattice", "resolution", "depth_image", "kd_tree"),
+    ("lattice", "resolution", "depth_image", "kd_tree", "voxels", "scan"),
     ("simd",),
     ("cell_index", "surface_index", "tensor"),
     ("ball", "curvature"),
     ("block_sums", "fit", "frame"),
     ("members", "shells", "hierarchy"),
     ("extract",),
-    ("field", "primitive"),
+    ("field", "primitive", "orientation"),
     ("surfaces", "alignment"),
+    ("registration",),
 )
 """Modules of the core, the lowest floor first."""
 

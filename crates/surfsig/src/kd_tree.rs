@@ -101,20 +101,29 @@ impl KdTree {
     /// assert_eq!(tree.nearest([1.5, 0.0, 0.0], 1.0), Some((1, 0.25)));
     /// ```
     pub fn nearest(&self, point: [f64; 3], reach: f64) -> Option<(u32, f64)> {
+        self.nearest_where(point, reach, |_| true)
+    }
+
+    /// The same among those points whose number `is_wanted`.
+    ///
+    /// ```
+    /// let tree = surfsig::KdTree::new(&[[0.0; 3], [2.0, 0.0, 0.0]]);
+    /// assert_eq!(tree.nearest_where([1.5, 0.0, 0.0], 2.0, |index| index != 1), Some((0, 2.25)));
+    /// ```
+    pub fn nearest_where(
+        &self,
+        point: [f64; 3],
+        reach: f64,
+        is_wanted: impl Fn(u32) -> bool,
+    ) -> Option<(u32, f64)> {
         let mut best = (reach * reach, u32::MAX);
-        self.descend(
-            point,
-            0,
-            0..self.len(),
-            [0.0; 3],
-            &mut |distance, index| {
-                if (distance, index) < best {
-                    best = (distance, index);
-                }
-                best.0
-            },
-            &mut { reach * reach },
-        );
+        let mut take = |distance, index| {
+            if (distance, index) < best && is_wanted(index) {
+                best = (distance, index);
+            }
+            best.0
+        };
+        self.descend(point, 0, 0..self.len(), [0.0; 3], &mut take, &mut { reach * reach });
         (best.1 < u32::MAX).then_some((best.1, best.0))
     }
 

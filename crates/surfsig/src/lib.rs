@@ -49,9 +49,12 @@ mod members;
 mod moments;
 mod monitor;
 mod odometry;
+mod orientation;
 mod point_cloud;
 mod primitive;
+mod registration;
 mod resolution;
+mod scan;
 mod shells;
 mod simd;
 mod similarity;
@@ -61,9 +64,12 @@ mod surfaces;
 mod tensor;
 mod threads;
 mod visibility;
-mod voxel_means;
+mod voxels;
 
-pub use alignment::{GicpCloud, GicpResult, GicpSettings, gicp};
+pub use alignment::{
+    ConsensusSettings, FreeDirection, GicpCloud, GicpResult, GicpSettings, PointToSurfaceSettings,
+    free_directions, gicp,
+};
 pub use cell_index::CellIndex;
 pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
 pub use depth_image::{DepthImage, Judgement, SurfacePlace};
@@ -73,8 +79,9 @@ pub use extract::{
     extract_radii, voxel_representatives,
 };
 pub use field::{
-    FIELD_PHASES, FIELD_SIGNATURE, FieldOptions, FieldPatches, FieldPhases, FieldSignature,
-    field_distinctiveness, field_pools, field_signatures,
+    FIELD_PHASES, FIELD_SIGNATURE, FieldMatch, FieldOptions, FieldPatches, FieldPhases, FieldPlaces,
+    FieldSignature, KeypointOptions, field_distinctiveness, field_pools, field_signatures, find_keypoints,
+    match_fields,
 };
 pub use fit::{
     Cylinder, FitAxes, FitKind, FitUsed, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere,
@@ -90,7 +97,9 @@ pub use odometry::{
 };
 pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
+pub use registration::{REGISTRATION_STEPS, Registration, RegistrationSettings, register};
 pub use resolution::{COARSEST_STEP, Resolution};
+pub use scan::Scan;
 pub use simd::InstructionSet;
 pub use similarity::{GOOD, OPTIMAL, SimilarityClass, similarity};
 pub use status::Status;
@@ -98,3 +107,4 @@ pub use surface_index::SurfaceIndex;
 pub use surfaces::{FEWEST_SURFACE_POINTS, FoundSurface, FoundSurfaces, SurfaceOptions, find_surfaces};
 pub use threads::with_threads;
 pub use visibility::{RangeImageSettings, SphericalRangeImage, Visibility};
+pub use voxels::voxel_means;

@@ -1,5 +1,6 @@
 //! Covariances of transforms whose residuals err alike near each other: cluster-robust, by blocks.
 
+use super::least_squares::pseudo_inverse;
 use nalgebra::{Matrix6, Vector6};
 use rustc_hash::FxHashMap;
 
@@ -42,21 +43,8 @@ pub(crate) fn clustered_covariance(design: &[[f64; 6]], residuals: &[f64], block
         information += row * row.transpose();
     }
     let spread = gradients.iter().map(|gradient| gradient * gradient.transpose()).sum::<Matrix6<f64>>();
-    let inverse = pseudo_inverse(information);
+    let inverse = pseudo_inverse(information, UNOBSERVABLE);
     inverse * spread * inverse * (count as f64 / (count as f64 - 6.0))
-}
-
-/// The inverse of a symmetric matrix in the directions that it determines; 0 in the others.
-pub(crate) fn pseudo_inverse(matrix: Matrix6<f64>) -> Matrix6<f64> {
-    let eigen = matrix.symmetric_eigen();
-    let least = UNOBSERVABLE * eigen.eigenvalues.amax();
-    let mut inverse = Matrix6::zeros();
-    for (value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-        if *value > least {
-            inverse += direction * direction.transpose() / *value;
-        }
-    }
-    inverse
 }
 
 #[cfg(test)]

@@ -1,8 +1,23 @@
 //! What registration, finding, odometry and recurrences share: how one surface lies on another, and how sure that is.
+//!
+//! Matches propose a transform ([`consensus`]), distributions refine it ([`gicp`]), points fit it to the surface
+//! ([`point_to_surface`]), and [`observability`] tells in which directions nothing determines it.
 
 mod clustered_covariance;
+mod consensus;
+mod even_sample;
 mod gicp;
+mod least_squares;
+mod observability;
+mod point_to_surface;
 
 pub(crate) use clustered_covariance::{blocks, clustered_covariance};
+pub use consensus::ConsensusSettings;
+pub(crate) use consensus::Correspondences;
+pub(crate) use even_sample::even_sample;
 pub use gicp::{GicpCloud, GicpResult, GicpSettings, gicp};
 pub(crate) use gicp::{GicpTarget, gicp_with, normal_of};
+pub(crate) use least_squares::solve_determined;
+pub use observability::{FreeDirection, free_directions};
+pub use point_to_surface::PointToSurfaceSettings;
+pub(crate) use point_to_surface::TargetSurface;

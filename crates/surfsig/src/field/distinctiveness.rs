@@ -42,6 +42,16 @@ pub fn field_distinctiveness(
     threads: Option<usize>,
     monitor: &Monitor,
 ) -> Result<Vec<f32>, Error> {
+    with_threads(threads, || distinctiveness(vectors, places, radius, monitor))?
+}
+
+/// The same, on the threads that are there.
+pub(super) fn distinctiveness(
+    vectors: &[[f32; FIELD_SIGNATURE]],
+    places: &[[f64; 3]],
+    radius: Radius,
+    monitor: &Monitor,
+) -> Result<Vec<f32>, Error> {
     assert_eq!(vectors.len(), places.len(), "one place for each vector");
     let set = InstructionSet::detect();
     let apart = |a: usize, b: usize| {
@@ -53,34 +63,32 @@ pub fn field_distinctiveness(
             largest[LIKE - counted..].iter().map(|&product| (2.0 - 2.0 * product).max(0.0).sqrt());
         distances.sum::<f32>() / counted as f32
     };
-    with_threads(threads, || {
-        let panels: Vec<Panel<FIELD_SIGNATURE>> = vectors.par_chunks(COLUMNS).map(Panel::of).collect();
-        let found: Vec<Vec<f32>> = (0..vectors.len())
-            .into_par_iter()
-            .step_by(TOGETHER)
-            .map(|start| {
-                monitor.check()?;
-                let mut largest = [[-1.0; LIKE]; TOGETHER];
-                for (panel, others) in panels.iter().zip((0..).step_by(COLUMNS)) {
-                    for first in (start..vectors.len().min(start + TOGETHER)).step_by(ROWS) {
-                        // Beyond the last vector stands the last once more, and is not looked at.
-                        let rows = std::array::from_fn(|r| &vectors[(first + r).min(vectors.len() - 1)]);
-                        for (r, products) in products(set, &rows, panel).iter().enumerate() {
-                            let place = first + r;
-                            if place < vectors.len() {
-                                keep_largest(&mut largest[place - start], products, |c| {
-                                    others + c < places.len() && apart(place, others + c)
-                                });
-                            }
+    let panels: Vec<Panel<FIELD_SIGNATURE>> = vectors.par_chunks(COLUMNS).map(Panel::of).collect();
+    let found: Vec<Vec<f32>> = (0..vectors.len())
+        .into_par_iter()
+        .step_by(TOGETHER)
+        .map(|start| {
+            monitor.check()?;
+            let mut largest = [[-1.0; LIKE]; TOGETHER];
+            for (panel, others) in panels.iter().zip((0..).step_by(COLUMNS)) {
+                for first in (start..vectors.len().min(start + TOGETHER)).step_by(ROWS) {
+                    // Beyond the last vector stands the last once more, and is not looked at.
+                    let rows = std::array::from_fn(|r| &vectors[(first + r).min(vectors.len() - 1)]);
+                    for (r, products) in products(set, &rows, panel).iter().enumerate() {
+                        let place = first + r;
+                        if place < vectors.len() {
+                            keep_largest(&mut largest[place - start], products, |c| {
+                                others + c < places.len() && apart(place, others + c)
+                            });
                         }
                     }
                 }
-                let count = TOGETHER.min(vectors.len() - start);
-                Ok(largest[..count].iter().map(unlike).collect())
-            })
-            .collect::<Result<_, Error>>()?;
-        Ok(found.concat())
-    })?
+            }
+            let count = TOGETHER.min(vectors.len() - start);
+            Ok(largest[..count].iter().map(unlike).collect())
+        })
+        .collect::<Result<_, Error>>()?;
+    Ok(found.concat())
 }
 
 /// Takes in those products that count.

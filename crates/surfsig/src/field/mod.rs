@@ -5,12 +5,19 @@
 //! not change when the patch is turned about its axis; the phases tell by how much it was turned.
 
 mod distinctiveness;
+mod field_places;
 mod frame;
+mod keypoints;
+mod matching;
 mod patch;
 mod support;
 
 pub use distinctiveness::field_distinctiveness;
+pub use field_places::FieldPlaces;
 pub use frame::{FIELD_PHASES, FIELD_SIGNATURE, FieldPhases};
+pub(crate) use keypoints::keypoints_within;
+pub use keypoints::{KeypointOptions, find_keypoints};
+pub use matching::{FieldMatch, match_fields};
 
 use crate::simd::InstructionSet;
 use crate::simd::field::{FEATURES, ORDERS, Pool, WAVES};
@@ -118,6 +125,17 @@ pub fn field_signatures(
     options: &FieldOptions<'_>,
     monitor: &Monitor,
 ) -> Result<FieldPatches<FieldSignature>, Error> {
+    with_threads(options.threads, || signatures_within(cloud, radius, queries, options, monitor))?
+}
+
+/// The same, on the threads that are there.
+pub(crate) fn signatures_within(
+    cloud: &PointCloud<'_>,
+    radius: Radius,
+    queries: &Queries<'_>,
+    options: &FieldOptions<'_>,
+    monitor: &Monitor,
+) -> Result<FieldPatches<FieldSignature>, Error> {
     let frame = FieldFrame::shared();
     let of_pools = |set, pools: &[Pool]| frame.signatures(set, pools);
     run(cloud, radius, queries, options, monitor, of_pools, || FieldSignature::of(f32::NAN))
@@ -149,7 +167,8 @@ pub fn field_pools(
     monitor: &Monitor,
 ) -> Result<FieldPatches<Box<[[f32; WAVES]; FEATURES]>>, Error> {
     let of_pools = |_, pools: &[Pool]| pools.iter().map(|pool| Some(Box::new(*pool.features()))).collect();
-    run(cloud, radius, queries, options, monitor, of_pools, || Box::new([[f32::NAN; WAVES]; FEATURES]))
+    let none = || Box::new([[f32::NAN; WAVES]; FEATURES]);
+    with_threads(options.threads, || run(cloud, radius, queries, options, monitor, of_pools, none))?
 }
 
 fn run<T: Send>(
@@ -158,17 +177,15 @@ fn run<T: Send>(
     queries: &Queries<'_>,
     options: &FieldOptions<'_>,
     monitor: &Monitor,
-    of_pools: impl Fn(InstructionSet, &[Pool]) -> Vec<Option<T>> + Sync,
-    none: impl Fn() -> T + Sync,
+    of_pools: impl Fn(InstructionSet, &[Pool]) -> Vec<Option<T>> + Send + Sync,
+    none: impl Fn() -> T + Send + Sync,
 ) -> Result<FieldPatches<T>, Error> {
     queries.check(cloud)?;
     if let Some(directions) = options.directions.map(<[_]>::len).filter(|&n| n != cloud.len()) {
         return Err(Error::DirectionsMismatch { directions, queries: cloud.len() });
     }
-    with_threads(options.threads, || {
-        let support = Support::new(cloud, radius, options, monitor)?;
-        let places: Vec<[f64; 3]> = queries.positions(cloud).collect();
-        let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
-        patches(&support, &places, radius, set, monitor, &of_pools, &none)
-    })?
+    let support = Support::new(cloud, radius, options, monitor)?;
+    let places: Vec<[f64; 3]> = queries.positions(cloud).collect();
+    let set = options.instruction_set.unwrap_or_else(InstructionSet::detect);
+    patches(&support, &places, radius, set, monitor, &of_pools, &none)
 }

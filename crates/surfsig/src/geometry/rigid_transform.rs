@@ -1,6 +1,6 @@
 //! Rigid transforms: a rotation and a translation.
 
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Matrix4, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use std::ops::Mul;
 
 /// Largest entry of R^T R - 1 at which a matrix counts as a rotation: what is left of one that was printed with four
@@ -156,6 +156,52 @@ impl RigidTransform {
         let turned = Self::from_rotation_vector(rotation_vector, translation);
         let center = Vector3::from(center);
         Self { translation: center - turned.rotation * center + turned.translation, ..turned }
+    }
+
+    /// The transform that takes points to others with the least sum of squared distances.
+    ///
+    /// By the unit quaternion of Horn (Closed-form solution of absolute orientation using unit quaternions, 1987), so
+    /// that nothing is mirrored; at least three pairs that are not on a line determine it.
+    ///
+    /// # Panics
+    /// If there is not one target for each source.
+    ///
+    /// ```
+    /// use surfsig::RigidTransform;
+    ///
+    /// let truth = RigidTransform::from_rotation_vector([0.3, -0.2, 2.5], [1.0, 2.0, 3.0]);
+    /// let source = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.5, 0.0, 1.0]];
+    /// let found = RigidTransform::from_correspondences(&source, &truth.transform_points(&source));
+    /// assert!((truth.inverse() * found).log().iter().all(|component| component.abs() < 1e-12));
+    /// ```
+    pub fn from_correspondences(source: &[[f64; 3]], target: &[[f64; 3]]) -> Self {
+        assert_eq!(source.len(), target.len(), "one target for each source");
+        let mean = |points: &[[f64; 3]]| {
+            points.iter().map(|point| Vector3::from(*point)).sum::<Vector3<f64>>()
+                / points.len().max(1) as f64
+        };
+        let (ours, theirs) = (mean(source), mean(target));
+        let products = source
+            .iter()
+            .zip(target)
+            .map(|(a, b)| (Vector3::from(*a) - ours) * (Vector3::from(*b) - theirs).transpose());
+        let m = products.sum::<Matrix3<f64>>();
+        let trace = m.trace();
+        let mut quadratic = Matrix4::zeros();
+        quadratic[(0, 0)] = trace;
+        for i in 0..3 {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            quadratic[(0, i + 1)] = m[(j, k)] - m[(k, j)];
+            quadratic[(i + 1, 0)] = quadratic[(0, i + 1)];
+            for l in 0..3 {
+                quadratic[(i + 1, l + 1)] = m[(i, l)] + m[(l, i)] - if i == l { trace } else { 0.0 };
+            }
+        }
+        let eigen = quadratic.symmetric_eigen();
+        let q = eigen.eigenvectors.column(eigen.eigenvalues.imax());
+        let quaternion = UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]));
+        let rotation = *quaternion.to_rotation_matrix().matrix();
+        Self { rotation, translation: theirs - rotation * ours }
     }
 
     /// The transform that takes the target back to the source.

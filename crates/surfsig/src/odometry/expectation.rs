@@ -2,7 +2,7 @@
 
 use super::scan_alignment::ScanAlignment;
 use super::settings::ExpectationSettings;
-use super::statistics::median;
+use crate::scan::median;
 use std::collections::VecDeque;
 
 /// What the last scans with a pose did; all shares depend on the sensor and its surroundings.
@@ -60,21 +60,17 @@ impl Expectation {
     }
 
     fn overlap(&self) -> f64 {
-        median_of(&self.overlaps).unwrap_or(self.settings.first_overlap)
+        median(self.overlaps.iter().copied().collect()).unwrap_or(self.settings.first_overlap)
     }
 
     fn free_space(&self) -> f64 {
-        median_of(&self.free_space).unwrap_or(0.0)
+        median(self.free_space.iter().copied().collect()).unwrap_or(0.0)
     }
 
     /// Before any scan is known, all of one may be new.
     fn largest_unexplained(&self) -> f64 {
         self.unexplained.iter().copied().reduce(f64::max).unwrap_or(1.0)
     }
-}
-
-fn median_of(values: &VecDeque<f64>) -> Option<f64> {
-    (!values.is_empty()).then(|| median(&mut values.iter().copied().collect::<Vec<f64>>()))
 }
 
 #[cfg(test)]

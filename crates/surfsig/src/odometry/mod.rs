@@ -1,6 +1,6 @@
 //! Odometry: the pose of each scan of a sequence in a map that the scans before it have made.
 //!
-//! A scan is thinned ([`scan`]) by lengths of the first one ([`scale`]), expected where the last motion leads, and
+//! A scan is thinned ([`thinned_scan`]) by lengths of the first one ([`scale`]), expected where the last motion leads, and
 //! aligned ([`scan_alignment`]) with the map of the surroundings ([`local_map`]). Where it lies there worse than scans
 //! did of late ([`expectation`]), it is searched among keyframes ([`keyframes`]). [`tracker`] goes from scan to scan.
 
@@ -10,10 +10,10 @@ mod keyframes;
 mod local_map;
 mod result;
 mod scale;
-mod scan;
 mod scan_alignment;
 mod settings;
 mod statistics;
+mod thinned_scan;
 mod tracker;
 mod voxel_index;
 
@@ -23,16 +23,19 @@ pub use settings::{
     ScaleSettings, ScanAlignmentSettings,
 };
 
-use crate::{Error, PointCloud, RigidTransform, with_threads};
+use crate::{Error, RigidTransform, Scan, with_threads};
 use nalgebra::Matrix6;
 use scale::Scale;
-use scan::{Scan, SensorPosition};
+use thinned_scan::{SensorPosition, ThinnedScan};
 use tracker::{Step, Tracker};
+
+/// Voxels from the sensor beyond which no point is measured; they are numbered with 32 bits.
+const FARTHEST: f64 = 1e9;
 
 /// Follows a sensor from scan to scan.
 ///
 /// ```
-/// use surfsig::{Odometry, OdometrySettings, PointCloud, ScanStatus};
+/// use surfsig::{Odometry, OdometrySettings, PointCloud, Scan, ScanStatus};
 ///
 /// // A room of 8 x 6 x 3 with a pillar, seen from a point within it.
 /// let scan = |x: f64| -> Vec<[f64; 3]> {
@@ -56,7 +59,7 @@ use tracker::{Step, Tracker};
 /// let mut odometry = Odometry::new(OdometrySettings::default())?;
 /// for step in 0..3 {
 ///     let x = 2.0 + 0.1 * f64::from(step);
-///     let found = odometry.push(&PointCloud::new_f64(&scan(x)), None)?;
+///     let found = odometry.push(&Scan::new(PointCloud::new_f64(&scan(x))))?;
 ///     assert_eq!((found.len(), found[0].status), (1, ScanStatus::Tracked));
 ///     let pose = found[0].T_map_scan.unwrap().to_matrix();
 ///     assert!((pose[0][3] - (x - 2.0)).abs() < 0.01 && pose[1][3].abs() < 0.01);
@@ -103,18 +106,14 @@ impl Odometry {
     /// [`Error::Threads`] where the system refuses the threads.
     ///
     /// ```
-    /// use surfsig::{Odometry, OdometrySettings, PointCloud, ScanStatus};
+    /// use surfsig::{Odometry, OdometrySettings, PointCloud, Scan, ScanStatus};
     /// let mut odometry = Odometry::new(OdometrySettings::default())?;
     /// let few = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// assert_eq!(odometry.push(&PointCloud::new(&few), None)?[0].status, ScanStatus::TooFewPoints);
+    /// assert_eq!(odometry.push(&Scan::new(PointCloud::new(&few)))?[0].status, ScanStatus::TooFewPoints);
     /// # Ok::<(), surfsig::Error>(())
     /// ```
-    pub fn push(
-        &mut self,
-        scan: &PointCloud<'_>,
-        viewpoint: Option<[f64; 3]>,
-    ) -> Result<Vec<ScanPose>, Error> {
-        with_threads(self.settings.threads, || self.push_here(scan, viewpoint))
+    pub fn push(&mut self, scan: &Scan<'_>) -> Result<Vec<ScanPose>, Error> {
+        with_threads(self.settings.threads, || self.push_here(scan))
     }
 
     /// The results of all scans so far. One that is lost may still get a pose by the next scans.
@@ -139,9 +138,9 @@ impl Odometry {
         self.tracked.as_ref().map(|tracked| tracked.scale.voxel)
     }
 
-    fn push_here(&mut self, cloud: &PointCloud<'_>, viewpoint: Option<[f64; 3]>) -> Vec<ScanPose> {
+    fn push_here(&mut self, scan: &Scan<'_>) -> Vec<ScanPose> {
         let farthest = self.settings.scale.farthest_viewpoint;
-        let (mut points, sensor) = self.sensor_position.about_sensor(cloud, viewpoint, farthest);
+        let (mut points, sensor) = self.sensor_position.about_sensor(scan, farthest);
         let number = self.poses.len();
         self.sensors.push(sensor);
         self.poses.push(ScanPose::none(number, ScanStatus::TooFewPoints));
@@ -155,7 +154,8 @@ impl Odometry {
         let Some(tracked) = &mut self.tracked else { return vec![self.poses[number].clone()] };
         let per_voxel = 1.0 / tracked.scale.voxel;
         points.iter_mut().for_each(|point| *point = point.map(|c| c * per_voxel));
-        let scan = is_usable.then(|| Scan::new(points, &self.settings));
+        points.retain(|point| point.iter().all(|c| c.abs() < FARTHEST));
+        let scan = is_usable.then(|| ThinnedScan::new(points, &self.settings));
         let Some(scan) = scan.filter(|scan| scan.points.len() >= min_points) else {
             tracked.tracker.skip();
             return vec![self.poses[number].clone()];

@@ -39,10 +39,10 @@ impl ScanStatus {
 /// A scan's pose in the map, whose frame is that of the first scan that has one.
 ///
 /// ```
-/// use surfsig::{Odometry, OdometrySettings, PointCloud, ScanStatus};
+/// use surfsig::{Odometry, OdometrySettings, PointCloud, Scan, ScanStatus};
 ///
 /// let mut odometry = Odometry::new(OdometrySettings::default())?;
-/// let found = odometry.push(&PointCloud::new(&[]), None)?;
+/// let found = odometry.push(&Scan::new(PointCloud::new(&[])))?;
 /// assert_eq!(found[0].status, ScanStatus::TooFewPoints);
 /// assert!(found[0].T_map_scan.is_none() && found[0].covariance[0][0].is_nan());
 /// # Ok::<(), surfsig::Error>(())

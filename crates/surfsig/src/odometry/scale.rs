@@ -1,7 +1,8 @@
 //! Lengths that a sequence is worked with, taken from its first scan.
 
 use super::settings::ScaleSettings;
-use super::statistics::{median, quantile};
+use super::statistics::quantile;
+use crate::scan::median;
 use rustc_hash::FxHashSet;
 
 /// Halvings of the interval in which the voxel is looked for: 1e-6 to 1 of the scan's extent, to one part in a million.
@@ -32,15 +33,15 @@ impl Scale {
             .collect();
         Self {
             voxel: voxel.unwrap_or_else(|| edge_of_voxels(&central, settings)),
-            median_range: median(&mut distances(points, [0.0; 3])),
-            patch_radius: settings.patch_radius * median(&mut spread.clone()),
+            median_range: median(distances(points, [0.0; 3])).unwrap_or(0.0),
+            patch_radius: settings.patch_radius * median(spread).unwrap_or(0.0),
         }
     }
 }
 
 /// The median of each coordinate.
 pub(super) fn median_point(points: &[[f64; 3]]) -> [f64; 3] {
-    [0, 1, 2].map(|k| median(&mut points.iter().map(|point| point[k]).collect::<Vec<f64>>()))
+    [0, 1, 2].map(|k| median(points.iter().map(|point| point[k]).collect()).unwrap_or(0.0))
 }
 
 pub(super) fn distances(points: &[[f64; 3]], from: [f64; 3]) -> Vec<f64> {
@@ -78,7 +79,7 @@ fn edge_of_voxels(points: &[[f64; 3]], settings: &ScaleSettings) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::voxel_means::voxel_means;
+    use crate::voxels::voxel_means;
 
     #[test]
     fn a_scan_fills_as_many_voxels_as_were_asked_for() {

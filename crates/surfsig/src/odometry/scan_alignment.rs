@@ -2,12 +2,12 @@
 
 use super::correspondences::Correspondences;
 use super::local_map::LocalMap;
-use super::scan::Scan;
 use super::settings::ScanAlignmentSettings;
-use super::statistics::median;
+use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
-use crate::alignment::{GicpSettings, blocks, clustered_covariance, gicp_with};
-use nalgebra::{Matrix6, SymmetricEigen, Vector3, Vector6};
+use crate::alignment::{GicpSettings, blocks, clustered_covariance, gicp_with, solve_determined};
+use crate::scan::median;
+use nalgebra::{Matrix6, Vector3, Vector6};
 use std::collections::BTreeMap;
 
 /// Standard deviations of a normal distribution in the median of its absolute values.
@@ -39,7 +39,7 @@ pub(super) struct ScanAlignment {
 /// `max_distance` is between corresponding points, in the first round; `would_be_known` tells by the scan's pose which
 /// of its points earlier scans would have measured.
 pub(super) fn align<F: Fn([f64; 3]) -> bool>(
-    scan: &Scan,
+    scan: &ThinnedScan,
     map: &LocalMap,
     start: RigidTransform,
     max_distance: f64,
@@ -108,7 +108,7 @@ struct PointToPlane {
 impl PointToPlane {
     /// `None` where inliers are too few.
     fn new(
-        scan: &Scan,
+        scan: &ThinnedScan,
         map: &LocalMap,
         pose: &RigidTransform,
         correspondences: &mut Correspondences,
@@ -124,11 +124,11 @@ impl PointToPlane {
         };
         let near: Vec<Option<(u32, f64, f64)>> =
             found.iter().zip(&scan.points).map(|(other, point)| residual(other, point)).collect();
-        let mut sizes: Vec<f64> = near.iter().flatten().map(|(_, _, residual)| residual.abs()).collect();
+        let sizes: Vec<f64> = near.iter().flatten().map(|(_, _, residual)| residual.abs()).collect();
         if sizes.len() < settings.min_correspondences {
             return None;
         }
-        let deviation = DEVIATIONS_IN_MEDIAN * median(&mut sizes);
+        let deviation = DEVIATIONS_IN_MEDIAN * median(sizes).unwrap_or(0.0);
         let limit = settings.max_residual.min(settings.max_deviation * deviation.max(settings.min_deviation));
         let beside = settings.explained_distance * settings.explained_distance;
         let explains = |(_, squared, residual): &(u32, f64, f64)| {
@@ -174,14 +174,7 @@ impl PointToPlane {
 
     /// The motion in the scan's axes that makes the residuals least, along the directions that they determine.
     fn step(&self) -> RigidTransform {
-        let eigen = SymmetricEigen::new(self.information);
-        let least = ROUNDING * eigen.eigenvalues.amax();
-        let mut step = Vector6::zeros();
-        for (value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            if *value > least {
-                step -= direction * (direction.dot(&self.gradient) / value);
-            }
-        }
+        let step = -solve_determined(self.information, &self.gradient, ROUNDING);
         let [x, y, z, translation @ ..] = <[f64; 6]>::from(step);
         RigidTransform::from_rotation_vector([x, y, z], translation)
     }

@@ -1,4 +1,4 @@
-//! Medians and other quantiles.
+//! Quantiles.
 
 /// The value below which a share of the values lies, linear between two of them; NaN where there is none. The values
 /// are put into another order.
@@ -13,11 +13,6 @@ pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
     if part > 0.0 { *low + part * (next - *low) } else { *low }
 }
 
-/// The median; NaN where there is no value.
-pub(super) fn median(values: &mut [f64]) -> f64 {
-    quantile(values, 0.5)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -26,7 +21,7 @@ mod tests {
     fn quantiles_are_linear_between_sorted_values() {
         let mut values = [5.0, 1.0, 3.0, 2.0, 4.0];
         assert_eq!([0.0, 0.25, 0.6, 1.0].map(|share| quantile(&mut values, share)), [1.0, 2.0, 3.4, 5.0]);
-        assert_eq!(median(&mut [4.0, 1.0, 2.0, 10.0]), 3.0);
-        assert!(median(&mut []).is_nan());
+        assert_eq!(quantile(&mut [4.0, 1.0, 2.0, 10.0], 0.5), 3.0);
+        assert!(quantile(&mut [], 0.5).is_nan());
     }
 }

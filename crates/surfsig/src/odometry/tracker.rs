@@ -5,10 +5,10 @@ use super::keyframes::Keyframes;
 use super::local_map::LocalMap;
 use super::result::ScanStatus;
 use super::scale::{Scale, distances};
-use super::scan::Scan;
 use super::scan_alignment::{ScanAlignment, align};
 use super::settings::OdometrySettings;
 use super::statistics::quantile;
+use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
 use nalgebra::Matrix6;
 
@@ -90,7 +90,7 @@ impl Tracker {
     }
 
     /// Finds the pose of the next scan: none if it is lost, and several where it confirms those before.
-    pub fn follow(&mut self, scan: &Scan) -> Vec<Step> {
+    pub fn follow(&mut self, scan: &ThinnedScan) -> Vec<Step> {
         let farthest = quantile(&mut distances(&scan.points, [0.0; 3]), MOST);
         let needed = self.settings.map.range_factor * farthest;
         self.map_range = self.fixed_map_range.unwrap_or(self.map_range.max(needed));
@@ -141,7 +141,7 @@ impl Tracker {
     /// The pose found among keyframes, or else the doubted one where it may be kept.
     fn relocalised_or_doubted(
         &mut self,
-        scan: &Scan,
+        scan: &ThinnedScan,
         doubted: Option<ScanAlignment>,
         prediction: &RigidTransform,
     ) -> Option<(ScanAlignment, ScanStatus)> {
@@ -166,7 +166,7 @@ impl Tracker {
         }
     }
 
-    fn aligned(&self, scan: &Scan, start: RigidTransform) -> Option<ScanAlignment> {
+    fn aligned(&self, scan: &ThinnedScan, start: RigidTransform) -> Option<ScanAlignment> {
         let known = |pose: &RigidTransform| self.keyframes.would_have_seen(pose);
         align(scan, &self.map, start, self.correspondence_distance(), &self.settings.alignment, known)
     }
@@ -236,7 +236,7 @@ impl Tracker {
     }
 
     /// Puts a scan into the map, and gives its step after those that it confirms.
-    fn take(&mut self, scan: &Scan, step: Step) -> Vec<Step> {
+    fn take(&mut self, scan: &ThinnedScan, step: Step) -> Vec<Step> {
         self.go_on(&step);
         let pose = step.T_map_scan;
         let steps = if self.trial.is_empty() { vec![step] } else { std::mem::take(&mut self.trial) };

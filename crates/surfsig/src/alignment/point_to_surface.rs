@@ -1,0 +1,299 @@
+//! The last steps of a transform, by the distances of points from a surface; and how sure it then is.
+
+use super::clustered_covariance::{blocks, clustered_covariance};
+use super::least_squares::{pseudo_inverse, solve_determined};
+use crate::geometry::RigidTransform;
+use crate::kd_tree::KdTree;
+use crate::scan::median;
+use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, SymmetricEigen, Vector3, Vector6};
+use rayon::prelude::*;
+
+/// Nearest points of the target that its surface is fitted to.
+const NEIGHBORS: usize = 20;
+/// Coefficients of the paraboloid.
+const UNKNOWNS: usize = 6;
+/// Of the largest eigenvalue, below which a direction is not determined by the residuals.
+const UNDETERMINED: f64 = 1e-8;
+/// Rounding, likewise.
+const ROUNDING: f64 = 1e-12;
+/// Points that a thread works on at a time.
+const PART: usize = 128;
+/// Standard deviations of Gaussian residuals in their median absolute value.
+const DEVIATIONS: f64 = 1.4826;
+
+/// How points are fitted to a surface; lengths are in voxels, the distance between points.
+///
+/// ```
+/// assert_eq!(surfsig::PointToSurfaceSettings::default().max_iterations, 6);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointToSurfaceSettings {
+    /// Largest distance to the target's nearest point, in voxels: beyond, there is no surface to measure from.
+    pub max_distance: f64,
+    /// Where the neighbours' mean lies from the point, over their spread along the surface, at most: beyond, the point
+    /// is off the surface's rim.
+    pub max_off_center: f64,
+    /// Smallest over middle standard deviation of the neighbours, at most: beyond, they lie on no surface.
+    pub max_thickness: f64,
+    /// Standard deviations within which a residual is an inlier.
+    pub max_deviations: f64,
+    /// Smallest standard deviation of the residuals, in voxels: surfaces without noise still differ by the fit.
+    pub min_deviation: f64,
+    /// Medians of the neighbours' variance about the fit, from which on there is an edge and no surface.
+    pub max_variance: f64,
+    /// Steps, at most.
+    pub max_iterations: usize,
+    /// Length of a step, in voxels, below which the transform has converged.
+    pub epsilon: f64,
+    /// Inliers without which there is no result: twice the unknowns.
+    pub min_inliers: usize,
+}
+
+impl Default for PointToSurfaceSettings {
+    fn default() -> Self {
+        Self {
+            max_distance: 3.0,
+            max_off_center: 0.6,
+            max_thickness: 0.35,
+            max_deviations: 4.0,
+            min_deviation: 0.02,
+            max_variance: 4.0,
+            max_iterations: 6,
+            epsilon: 1e-4,
+            min_inliers: 12,
+        }
+    }
+}
+
+/// A target's points, whose surface at a place is a paraboloid (eq. (5)) through the nearest ones.
+pub(crate) struct TargetSurface {
+    points: Vec<[f64; 3]>,
+    tree: KdTree,
+    voxel: f64,
+}
+
+/// How far a point is above the surface, and what the surface there rests on.
+struct Residual {
+    /// Of the source's point.
+    number: usize,
+    /// Along the normal.
+    distance: f64,
+    normal: Vector3<f64>,
+    /// The target's points that tell the distance.
+    neighbors: [u32; NEIGHBORS],
+    /// What each adds to the distance, per its own error along the normal.
+    weights: [f64; NEIGHBORS],
+    /// Of the neighbours about the surface.
+    variance: f64,
+}
+
+/// Source points that lie on the target's surface, after the transform was fitted to them.
+#[allow(non_snake_case)]
+pub(crate) struct PointToSurface {
+    pub T_target_source: RigidTransform,
+    /// Of the twist, rotation first, in the target's axes about `center`.
+    pub covariance: Matrix6<f64>,
+    pub center: [f64; 3],
+    /// Inliers, in the target.
+    pub points: Vec<[f64; 3]>,
+    /// The target's unit normals there.
+    pub normals: Vec<[f64; 3]>,
+    /// Share of the source's points that are inliers.
+    pub overlap: f64,
+    /// Of the inliers' distances.
+    pub rms: f64,
+}
+
+impl TargetSurface {
+    /// Points spread evenly over the surface, about a voxel apart.
+    pub fn new(points: Vec<[f64; 3]>, voxel: f64) -> Self {
+        let tree = KdTree::new(&points);
+        Self { points, tree, voxel }
+    }
+
+    /// Of one point; `None` where the target has no surface.
+    fn residual(
+        &self,
+        number: usize,
+        point: [f64; 3],
+        settings: &PointToSurfaceSettings,
+        found: &mut Vec<(f64, u32)>,
+    ) -> Option<Residual> {
+        self.tree.nearest_k(point, NEIGHBORS, found);
+        if found.len() < NEIGHBORS || found[0].0 >= (settings.max_distance * self.voxel).powi(2) {
+            return None;
+        }
+        let mut neighbors = [0; NEIGHBORS];
+        let mut around = [Vector3::zeros(); NEIGHBORS];
+        for (k, &(_, index)) in found.iter().enumerate() {
+            neighbors[k] = index;
+            around[k] = Vector3::from(self.points[index as usize]) - Vector3::from(point);
+        }
+        let mean = around.iter().sum::<Vector3<f64>>() / NEIGHBORS as f64;
+        let spread = around.iter().map(|p| (p - mean) * (p - mean).transpose()).sum::<Matrix3<f64>>()
+            / NEIGHBORS as f64;
+        let eigen = SymmetricEigen::new(spread);
+        let mut order = [0, 1, 2];
+        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        let [long, middle, short] = order.map(|k| eigen.eigenvalues[k].max(0.0).sqrt());
+        let axes = Matrix3::from_columns(&order.map(|k| eigen.eigenvectors.column(k).into_owned()));
+        let off_center = (axes.transpose() * mean).xy().norm();
+        if off_center >= settings.max_off_center * (middle + long) || short >= settings.max_thickness * middle
+        {
+            return None;
+        }
+        // z = f + d x + e y + (a x^2 + 2 b x y + c y^2) / 2, eq. (5), in axes along the points' spread.
+        let scale = long.max(f64::MIN_POSITIVE);
+        let local = around.map(|p| axes.transpose() * p / scale);
+        let design = SMatrix::<f64, NEIGHBORS, UNKNOWNS>::from_fn(|row, column| {
+            let [x, y] = [local[row].x, local[row].y];
+            [1.0, x, y, 0.5 * x * x, x * y, 0.5 * y * y][column]
+        });
+        let z = SVector::<f64, NEIGHBORS>::from_fn(|row, _| local[row].z);
+        let normal_matrix = design.tr_mul(&design) + SMatrix::<f64, UNKNOWNS, UNKNOWNS>::identity() * 1e-9;
+        let factored = normal_matrix.cholesky()?;
+        let fit = factored.solve(&design.tr_mul(&z));
+        // What f takes from each neighbour's z.
+        let share = design * factored.solve(&SVector::<f64, UNKNOWNS>::ith(0, 1.0));
+        let slope = Vector3::new(-fit[1], -fit[2], 1.0);
+        let steep = 1.0 / slope.norm();
+        // The point is at 0: the surface is f above it, measured along the normal.
+        let rest = (z - design * fit).norm_squared();
+        Some(Residual {
+            number,
+            distance: -fit[0] * scale * steep,
+            normal: axes * slope * steep,
+            neighbors,
+            weights: std::array::from_fn(|k| -share[k] * steep),
+            variance: rest * (scale * steep).powi(2) / (NEIGHBORS - UNKNOWNS) as f64,
+        })
+    }
+
+    /// Those of inliers: near the surface, where the target is smooth.
+    fn inliers(&self, moved: &[[f64; 3]], settings: &PointToSurfaceSettings) -> Option<Vec<Residual>> {
+        let residual = |found: &mut Vec<(f64, u32)>, (number, point): (usize, &[f64; 3])| {
+            self.residual(number, *point, settings, found)
+        };
+        let all: Vec<Residual> =
+            moved.par_iter().enumerate().with_min_len(PART).map_init(Vec::new, residual).flatten().collect();
+        if all.len() < settings.min_inliers {
+            return None;
+        }
+        let deviation = DEVIATIONS * median(all.iter().map(|one| one.distance.abs()).collect())?;
+        let farthest = settings.max_deviations * deviation.max(settings.min_deviation * self.voxel);
+        // Where the target's own points lie off their surface more than elsewhere, there is an edge.
+        let largest = settings.max_variance * median(all.iter().map(|one| one.variance).collect())?;
+        let is_inlier = |one: &Residual| one.variance <= largest && one.distance.abs() < farthest;
+        Some(all.into_iter().filter(is_inlier).collect())
+    }
+
+    /// Fits a transform that is nearly right, and says how sure it is; `None` where hardly a point meets the surface.
+    pub fn align(
+        &self,
+        source: &[[f64; 3]],
+        start: RigidTransform,
+        settings: &PointToSurfaceSettings,
+    ) -> Option<PointToSurface> {
+        let mut transform = start;
+        for step in 0.. {
+            let moved = transform.transform_points(source);
+            let inliers = self.inliers(&moved, settings)?;
+            if inliers.len() < settings.min_inliers {
+                return None;
+            }
+            let system = System::new(&inliers, &moved);
+            let change = -solve_determined(system.information, &system.gradient, UNDETERMINED);
+            if step == settings.max_iterations || change.norm() < settings.epsilon * self.voxel {
+                return Some(system.result(transform, &inliers, source.len()));
+            }
+            let [x, y, z, translation @ ..] = <[f64; 6]>::from(change);
+            let rotation_vector = [x, y, z].map(|angle| angle / system.unit);
+            transform = RigidTransform::about(system.center.into(), rotation_vector, translation) * transform;
+        }
+        None
+    }
+}
+
+/// The linearised distances of the inliers: how they change with a twist about their centre.
+struct System {
+    points: Vec<[f64; 3]>,
+    center: Vector3<f64>,
+    /// Rotations in units of this length move points as far as translations do.
+    unit: f64,
+    design: Vec<[f64; 6]>,
+    information: Matrix6<f64>,
+    gradient: Vector6<f64>,
+}
+
+impl System {
+    fn new(inliers: &[Residual], moved: &[[f64; 3]]) -> Self {
+        let points: Vec<[f64; 3]> = inliers.iter().map(|one| moved[one.number]).collect();
+        let count = points.len() as f64;
+        let center = points.iter().map(|point| Vector3::from(*point)).sum::<Vector3<f64>>() / count;
+        let offset = |point: &[f64; 3]| Vector3::from(*point) - center;
+        let square = points.iter().map(|point| offset(point).norm_squared()).sum::<f64>() / count;
+        let unit = if square > 0.0 { square.sqrt() } else { 1.0 };
+        let row = |(one, point): (&Residual, &[f64; 3])| -> [f64; 6] {
+            let rotational = (offset(point) / unit).cross(&one.normal);
+            [rotational.x, rotational.y, rotational.z, one.normal.x, one.normal.y, one.normal.z]
+        };
+        let design: Vec<[f64; 6]> = inliers.iter().zip(&points).map(row).collect();
+        let (mut information, mut gradient) = (Matrix6::zeros(), Vector6::zeros());
+        for (row, one) in design.iter().zip(inliers) {
+            let row = Vector6::from(*row);
+            information += row * row.transpose();
+            gradient += row * one.distance;
+        }
+        Self { points, center, unit, design, information, gradient }
+    }
+
+    fn result(self, transform: RigidTransform, inliers: &[Residual], of: usize) -> PointToSurface {
+        let distances: Vec<f64> = inliers.iter().map(|one| one.distance).collect();
+        let independent = self.independent_covariance(inliers);
+        let covariance = independent * self.alike(&distances, &independent);
+        let unit =
+            Matrix6::from_diagonal(&Vector6::from_fn(|k, _| if k < 3 { 1.0 / self.unit } else { 1.0 }));
+        let square = distances.iter().map(|distance| distance * distance).sum::<f64>();
+        PointToSurface {
+            T_target_source: transform,
+            covariance: unit * covariance * unit,
+            center: self.center.into(),
+            normals: inliers.iter().map(|one| one.normal.into()).collect(),
+            overlap: inliers.len() as f64 / of as f64,
+            rms: (square / inliers.len() as f64).sqrt(),
+            points: self.points,
+        }
+    }
+
+    /// The covariance if the points of both err independently of each other.
+    ///
+    /// A point of the target has a part in the distances of many of the source's: its error is in all of them, along
+    /// the normal of each.
+    fn independent_covariance(&self, inliers: &[Residual]) -> Matrix6<f64> {
+        let mean = |of: &dyn Fn(&Residual) -> f64| inliers.iter().map(of).sum::<f64>() / inliers.len() as f64;
+        let of_target = mean(&|one| one.variance);
+        let shares = mean(&|one| one.weights.iter().map(|weight| weight * weight).sum());
+        let of_source = (mean(&|one| one.distance * one.distance) - of_target * shares).max(0.0);
+        // Of each target point with a part: for each axis of its error, how the gradient changes with it.
+        let last = inliers.iter().flat_map(|one| one.neighbors).max().unwrap_or(0) as usize;
+        let mut parts = vec![SMatrix::<f64, 6, 3>::zeros(); last + 1];
+        for (one, row) in inliers.iter().zip(&self.design) {
+            let part = Vector6::from(*row) * one.normal.transpose();
+            for (&neighbor, &weight) in one.neighbors.iter().zip(&one.weights) {
+                parts[neighbor as usize] += part * weight;
+            }
+        }
+        let together = parts.iter().map(|part| part * part.transpose()).sum::<Matrix6<f64>>();
+        let inverse = pseudo_inverse(self.information, ROUNDING);
+        inverse * (self.information * of_source + together * of_target) * inverse
+    }
+
+    /// How much more the sums over blocks of neighbours vary than those of independent errors, 1 at least.
+    fn alike(&self, distances: &[f64], independent: &Matrix6<f64>) -> f64 {
+        let Some(block) = blocks(&self.points) else { return 1.0 };
+        let clustered = clustered_covariance(&self.design, distances, &block);
+        let expected = (independent * self.information).trace();
+        // Without any noise nothing varies.
+        if expected > 0.0 { ((clustered * self.information).trace() / expected).max(1.0) } else { 1.0 }
+    }
+}

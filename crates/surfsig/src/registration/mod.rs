@@ -1,0 +1,213 @@
+//! How a scan lies in another: [`register`].
+//!
+//! Keypoints are matched by their field signatures ([`crate::match_fields`]), the matches agree on a transform
+//! ([`crate::ConsensusSettings`]), generalised ICP refines it ([`crate::gicp`]), and the last steps fit points to the
+//! surface and tell how sure it is.
+
+mod result;
+mod settings;
+
+pub use result::Registration;
+pub use settings::RegistrationSettings;
+
+use crate::alignment::{
+    Correspondences, GicpCloud, GicpSettings, TargetSurface, even_sample, free_directions, gicp,
+};
+use crate::field::{KeypointOptions, keypoints_within, match_fields};
+use crate::geometry::RigidTransform;
+use crate::orientation::consistent_directions;
+use crate::scan::CenteredScan;
+use crate::voxels::voxel_means;
+use crate::{Error, FieldOptions, FieldPlaces, Monitor, PointCloud, Radius, Scan, with_threads};
+
+/// Steps of which [`Monitor::done`] counts each.
+pub const REGISTRATION_STEPS: usize = 5;
+
+/// Finds how a source lies in a target, from any start; or refines `start` (T_target_source) where one is given.
+///
+/// The result is the same whatever the number of threads. Where nothing is found its transform is `None`.
+///
+/// # Errors
+/// [`Error::Threads`], [`Error::Cancelled`], and [`Error::InvalidRadius`] for a radius that is none.
+///
+/// ```
+/// use surfsig::{register, Monitor, PointCloud, RegistrationSettings, RigidTransform, Scan};
+///
+/// let bump = |x: f64, y: f64, h: f64| h * (-3.0 * (x * x + 2.0 * y * y)).exp();
+/// let height = |x: f64, y: f64| bump(x - 1.0, y - 1.2, 0.5) - bump(y - 2.5, x - 2.2, 0.4) + bump(x - 3.0, y - 0.8, 0.3);
+/// let target: Vec<[f64; 3]> = (0..6400)
+///     .map(|i| (f64::from(i % 80) * 0.05, f64::from(i / 80) * 0.05))
+///     .map(|(x, y)| [x, y, height(x, y)])
+///     .collect();
+/// let truth = RigidTransform::from_rotation_vector([0.2, -0.1, 1.4], [3.0, 2.0, 1.0]);
+/// let source = truth.inverse().transform_points(&target);
+/// let viewpoint = [2.0, 2.0, 10.0];
+/// let found = register(
+///     &Scan::new(PointCloud::new_f64(&source)).seen_from(truth.inverse().transform_point(viewpoint)),
+///     &Scan::new(PointCloud::new_f64(&target)).seen_from(viewpoint),
+///     None,
+///     &RegistrationSettings::default(),
+///     &Monitor::default(),
+/// )?;
+/// let off = truth.inverse() * found.T_target_source.expect("there is one");
+/// assert!(found.trusted && off.log().iter().all(|component| component.abs() < 1e-3));
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+pub fn register(
+    source: &Scan<'_>,
+    target: &Scan<'_>,
+    start: Option<&RigidTransform>,
+    settings: &RegistrationSettings,
+    monitor: &Monitor,
+) -> Result<Registration, Error> {
+    with_threads(settings.threads, || {
+        let scans = [CenteredScan::new(source), CenteredScan::new(target)];
+        registered(&scans[0], &scans[1], start, settings, monitor)
+    })?
+}
+
+fn registered(
+    source: &CenteredScan,
+    target: &CenteredScan,
+    start: Option<&RigidTransform>,
+    settings: &RegistrationSettings,
+    monitor: &Monitor,
+) -> Result<Registration, Error> {
+    let size = source.size().min(target.size());
+    let radius = settings.radius.unwrap_or(settings.radius_share * size);
+    if source.points.len().min(target.points.len()) < settings.min_points || radius == 0.0 {
+        return Ok(Registration::nothing(radius, 0));
+    }
+    let [from_source, to_target] =
+        [source.center, target.center].map(|center| RigidTransform::from_rotation_vector([0.0; 3], center));
+    let (proposed, matches) = match start {
+        Some(start) => {
+            monitor.add(2);
+            (to_target.inverse() * *start * from_source, None)
+        }
+        None => {
+            let matches = matched(source, target, Radius::new(radius)?, settings, monitor)?;
+            if matches.len() < 3 {
+                return Ok(Registration::nothing(radius, matches.len()));
+            }
+            (matches.agreed_transform(), Some(matches))
+        }
+    };
+    let count = matches.as_ref().map_or(0, Correspondences::len);
+    monitor.check()?;
+    let voxel = radius / settings.voxels_per_radius;
+    let [ours, theirs] = [source, target].map(|scan| voxel_means(&scan.points, voxel));
+    if ours.len().min(theirs.len()) < settings.min_voxels {
+        return Ok(Registration::nothing(radius, count));
+    }
+    let sample = even_sample(&source.points, ours.len().min(settings.max_points), voxel);
+    let surface = TargetSurface::new(even_sample(&target.points, theirs.len(), voxel), voxel);
+    monitor.add(1);
+    monitor.check()?;
+    let refined = refined(ours, theirs, proposed, voxel, settings);
+    monitor.add(1);
+    monitor.check()?;
+    let Some(found) = surface.align(&sample, refined, &settings.point_to_surface) else {
+        return Ok(Registration::nothing(radius, count));
+    };
+    monitor.add(1);
+    let inliers = matches.as_ref().map_or(0, |matches| matches.inlier_count(&found.T_target_source));
+    let free = free_directions(&found.points, &found.normals);
+    let is_right = match matches {
+        None => found.overlap >= settings.trusted_overlap_of_start,
+        Some(_) => inliers >= settings.trusted_inliers && found.overlap >= settings.trusted_overlap,
+    };
+    Ok(Registration {
+        T_target_source: Some(to_target * found.T_target_source * from_source.inverse()),
+        covariance: found.covariance.into(),
+        center: to_target.transform_point(found.center),
+        trusted: is_right && free.is_empty(),
+        free_directions: free.iter().map(|direction| direction.transformed(&to_target)).collect(),
+        matches: count,
+        inliers,
+        overlap: found.overlap,
+        rms: found.rms,
+        radius,
+    })
+}
+
+/// Matches keypoints; where it is not known for both scans from where they were seen, both sides of the source's
+/// surface.
+fn matched(
+    source: &CenteredScan,
+    target: &CenteredScan,
+    radius: Radius,
+    settings: &RegistrationSettings,
+    monitor: &Monitor,
+) -> Result<Correspondences, Error> {
+    let oriented = |scan: &CenteredScan| -> Result<Option<Vec<[f32; 3]>>, Error> {
+        let voxel = radius.get() / settings.orientation_voxels_per_radius;
+        Ok(Some(consistent_directions(&scan.points, voxel, monitor)?))
+    };
+    let is_known = [source, target].map(|scan| scan.scan().is_oriented());
+    let theirs = if is_known[1] { None } else { oriented(target)? };
+    let theirs = described(target, theirs.as_deref(), radius, settings, monitor)?;
+    monitor.add(1);
+    let consensus = |ours: &FieldPlaces| {
+        Correspondences::new(&match_fields(ours, &theirs, true), ours, &theirs, settings.consensus)
+    };
+    if is_known == [true; 2] {
+        let ours = described(source, None, radius, settings, monitor)?;
+        monitor.add(1);
+        return Ok(consensus(&ours));
+    }
+    let one_side = oriented(source)?.unwrap_or_default();
+    let other_side: Vec<[f32; 3]> = one_side.iter().map(|direction| direction.map(|x| -x)).collect();
+    let sides = [&one_side, &other_side].map(|side| described(source, Some(side), radius, settings, monitor));
+    let [one, other] = sides;
+    monitor.add(1);
+    Ok(consensus(&one?).joined(consensus(&other?)))
+}
+
+/// Keypoints of a scan, with directions of its own or others.
+fn described(
+    scan: &CenteredScan,
+    directions: Option<&[[f32; 3]]>,
+    radius: Radius,
+    settings: &RegistrationSettings,
+    monitor: &Monitor,
+) -> Result<FieldPlaces, Error> {
+    let keypoints = KeypointOptions {
+        count: settings.keypoints,
+        spacing: None,
+        candidates_per_radius: settings.candidates_per_radius,
+    };
+    let own = scan.scan();
+    let options = match directions {
+        Some(directions) => FieldOptions { directions: Some(directions), ..Default::default() },
+        None => FieldOptions { viewpoint: own.viewpoint, directions: own.directions, ..Default::default() },
+    };
+    keypoints_within(&PointCloud::new_f64(&scan.points), radius, &keypoints, &options, &monitor.apart())
+}
+
+/// By generalised ICP, in voxels; a transform without correspondences stays as it was proposed.
+fn refined(
+    source: Vec<[f64; 3]>,
+    target: Vec<[f64; 3]>,
+    proposed: RigidTransform,
+    voxel: f64,
+    settings: &RegistrationSettings,
+) -> RigidTransform {
+    let [source, target] = [source, target].map(GicpCloud::new);
+    let mut transform = proposed;
+    for distance in settings.gicp_distances {
+        let [rotation_epsilon, translation] = settings.gicp_epsilon;
+        let round = GicpSettings {
+            max_correspondence_distance: distance * voxel,
+            max_iterations: settings.gicp_iterations,
+            rotation_epsilon,
+            translation_epsilon: translation * voxel,
+        };
+        let found = gicp(&target, &source, transform, &round);
+        if found.inliers == 0 {
+            return proposed;
+        }
+        transform = found.T_target_source;
+    }
+    transform
+}

@@ -1,0 +1,75 @@
+//! How scans are registered.
+
+use crate::alignment::{ConsensusSettings, PointToSurfaceSettings};
+
+/// What an expert may change; nothing has to be set.
+///
+/// ```
+/// let settings = surfsig::RegistrationSettings { keypoints: 500, ..Default::default() };
+/// assert_eq!(settings.voxels_per_radius, 16.0);
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct RegistrationSettings {
+    /// Radius of the patches that are matched, in the scans' unit; `None` for `radius_share` of the smaller scan.
+    pub radius: Option<f64>,
+    /// Radius of the patches over the median distance of a scan's points from their middle: so large that a patch has
+    /// shape, and so small that most of it lies within the overlap.
+    pub radius_share: f64,
+    /// Keypoints of each scan.
+    pub keypoints: usize,
+    /// Candidates for keypoints along a patch's radius.
+    pub candidates_per_radius: f64,
+    /// Voxels along a patch's radius, to which scans are thinned before they are refined.
+    pub voxels_per_radius: f64,
+    /// The same where normals are oriented by their neighbours, because no viewpoint is known.
+    pub orientation_voxels_per_radius: f64,
+    /// When matches agree.
+    pub consensus: ConsensusSettings,
+    /// Largest distances between correspondences in the rounds of generalised ICP, in voxels.
+    pub gicp_distances: [f64; 2],
+    /// Steps of each round, at most.
+    pub gicp_iterations: usize,
+    /// Radians, and voxels, of a step below which generalised ICP has converged; what follows takes smaller ones.
+    pub gicp_epsilon: [f64; 2],
+    /// The last steps.
+    pub point_to_surface: PointToSurfaceSettings,
+    /// Points of the source in the last steps, at most: more make the transform no surer, as neighbours err alike.
+    pub max_points: usize,
+    /// Points without which there is nothing to register.
+    pub min_points: usize,
+    /// Voxels of each scan without which there are no distributions to refine by.
+    pub min_voxels: usize,
+    /// Matches that agree, from which on a transform is trusted.
+    pub trusted_inliers: usize,
+    /// Overlap from which on it is.
+    pub trusted_overlap: f64,
+    /// Overlap from which on a transform is trusted that the caller gave roughly.
+    pub trusted_overlap_of_start: f64,
+    /// Number of threads; all cores where it is `None`. The result is the same, bit for bit.
+    pub threads: Option<usize>,
+}
+
+impl Default for RegistrationSettings {
+    fn default() -> Self {
+        Self {
+            radius: None,
+            radius_share: 0.4,
+            keypoints: 1000,
+            candidates_per_radius: 8.0,
+            voxels_per_radius: 16.0,
+            orientation_voxels_per_radius: 10.0,
+            consensus: ConsensusSettings::default(),
+            gicp_distances: [4.0, 2.0],
+            gicp_iterations: 20,
+            gicp_epsilon: [3e-4, 1e-2],
+            point_to_surface: PointToSurfaceSettings::default(),
+            max_points: 6000,
+            min_points: 50,
+            min_voxels: 16,
+            trusted_inliers: 24,
+            trusted_overlap: 0.04,
+            trusted_overlap_of_start: 0.3,
+            threads: None,
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! A scan: points, and what says on which side of their surface the sensor was.
+
+use crate::PointCloud;
+
+/// A point cloud with what is known of the sensor.
+///
+/// ```
+/// use surfsig::{PointCloud, Scan};
+/// let points = [[0.0_f32, 0.0, 1.0]];
+/// let scan = Scan::new(PointCloud::new(&points)).seen_from([0.0; 3]);
+/// assert!(scan.is_oriented());
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Scan<'a> {
+    /// The points.
+    pub cloud: PointCloud<'a>,
+    /// Where the sensor stood, in the cloud's coordinates.
+    pub viewpoint: Option<[f64; 3]>,
+    /// In place of a viewpoint: for each point a vector to the side from which it was seen, of any length.
+    pub directions: Option<&'a [[f32; 3]]>,
+}
+
+impl<'a> Scan<'a> {
+    /// Points of which nobody knows from where they were seen.
+    ///
+    /// ```
+    /// assert!(!surfsig::Scan::new(surfsig::PointCloud::new(&[])).is_oriented());
+    /// ```
+    pub fn new(cloud: PointCloud<'a>) -> Self {
+        Self { cloud, viewpoint: None, directions: None }
+    }
+
+    /// All points were seen from one place.
+    ///
+    /// ```
+    /// let scan = surfsig::Scan::new(surfsig::PointCloud::new(&[])).seen_from([1.0, 2.0, 3.0]);
+    /// assert_eq!(scan.viewpoint, Some([1.0, 2.0, 3.0]));
+    /// ```
+    #[must_use]
+    pub fn seen_from(self, viewpoint: [f64; 3]) -> Self {
+        Self { viewpoint: Some(viewpoint), ..self }
+    }
+
+    /// Each point has a vector to its own side.
+    ///
+    /// ```
+    /// let points = [[0.0_f32; 3]];
+    /// let scan = surfsig::Scan::new(surfsig::PointCloud::new(&points)).facing(&[[0.0, 0.0, 1.0]]);
+    /// assert!(scan.is_oriented());
+    /// ```
+    #[must_use]
+    pub fn facing(self, directions: &'a [[f32; 3]]) -> Self {
+        Self { directions: Some(directions), ..self }
+    }
+
+    /// Whether anything says on which side the sensor was.
+    pub fn is_oriented(&self) -> bool {
+        self.viewpoint.is_some() || self.directions.is_some()
+    }
+}
+
+/// A scan's finite points about their middle: all digits are kept, wherever the scan lies.
+#[derive(Debug, Clone)]
+pub(crate) struct CenteredScan {
+    pub points: Vec<[f64; 3]>,
+    /// In the scan's coordinates: the median of each coordinate.
+    pub center: [f64; 3],
+    /// About the centre, as the points.
+    pub viewpoint: Option<[f64; 3]>,
+    /// One for each of the points.
+    pub directions: Option<Vec<[f32; 3]>>,
+}
+
+impl CenteredScan {
+    pub fn new(scan: &Scan<'_>) -> Self {
+        let finite: Vec<usize> =
+            (0..scan.cloud.len()).filter(|&i| scan.cloud.position(i).is_some()).collect();
+        let positions: Vec<[f64; 3]> = finite.iter().filter_map(|&i| scan.cloud.position(i)).collect();
+        let center =
+            [0, 1, 2].map(|k| median(positions.iter().map(|point| point[k]).collect()).unwrap_or(0.0));
+        let about = |point: [f64; 3]| [0, 1, 2].map(|k| point[k] - center[k]);
+        Self {
+            points: positions.into_iter().map(about).collect(),
+            center,
+            viewpoint: scan.viewpoint.map(about),
+            directions: scan.directions.map(|all| finite.iter().map(|&i| all[i]).collect()),
+        }
+    }
+
+    /// The median distance of the points from their centre: a size that outliers do not change.
+    pub fn size(&self) -> f64 {
+        let distances = self.points.iter().map(|point| point.iter().map(|x| x * x).sum::<f64>().sqrt());
+        median(distances.collect()).unwrap_or(0.0)
+    }
+
+    pub fn scan(&self) -> Scan<'_> {
+        Scan {
+            cloud: PointCloud::new_f64(&self.points),
+            viewpoint: self.viewpoint,
+            directions: self.directions.as_deref(),
+        }
+    }
+}
+
+/// The middle one of numbers, or the mean of the middle two; `None` of none.
+pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return None;
+    }
+    let even = values.len().is_multiple_of(2);
+    let (below, &mut upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+    let lower = if even { below.iter().copied().fold(f64::NEG_INFINITY, f64::max) } else { upper };
+    Some(0.5 * (lower + upper))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_of_odd_and_even_counts() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
+        assert_eq!(median(vec![]), None);
+    }
+
+    #[test]
+    fn a_scan_far_away_is_the_same_scan_about_its_centre() {
+        let points = [[0.5_f32, 1.0, 2.0], [f32::NAN, 0.0, 0.0], [1.5, 3.0, 1.0], [2.5, 2.0, 0.0]];
+        let directions = [[1.0, 0.0, 0.0], [9.0; 3], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let near = Scan::new(PointCloud::new(&points)).facing(&directions);
+        let far = Scan { cloud: near.cloud.with_origin([4e6, 5e6, 100.0]), ..near };
+        let [near, far] = [near, far].map(|scan| CenteredScan::new(&scan));
+        assert_eq!(near.points, far.points);
+        assert_eq!(near.center, [1.5, 2.0, 1.0]);
+        assert_eq!(near.directions.unwrap(), [directions[0], directions[2], directions[3]]);
+        assert_eq!(far.center, [4e6 + 1.5, 5e6 + 2.0, 101.0]);
+    }
+}
