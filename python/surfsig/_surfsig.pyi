@@ -1,7 +1,7 @@
 """The compiled core: what it offers to the package."""
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, BinaryIO, final
+from typing import Any, BinaryIO, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ __all__ = [
     "DepthImage",
     "E57Reader",
     "Frame",
+    "Odometry",
     "Primitive",
     "SurfaceIndex",
     "SurfacePlaces",
@@ -178,6 +179,29 @@ class Frame:
     def signatures_of_surfaces(
         self, surfaces: NDArray[np.float32], *, side: float
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]: ...
+
+@final
+class Odometry:
+    STATUS_NAMES: ClassVar[list[str]]
+    def __new__(
+        cls,
+        *,
+        voxel: float | None = None,
+        max_correspondence_distance: float | None = None,
+        map_range: float | None = None,
+        threads: int | None = None,
+    ) -> Odometry: ...
+    def push(
+        self,
+        points: NDArray[np.floating],
+        *,
+        origin: Sequence[float],
+        viewpoint: Sequence[float] | None = None,
+    ) -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def voxel(self) -> float | None: ...
+    def arrays(self) -> dict[str, NDArray[Any]]: ...
 
 @final
 class Primitive:

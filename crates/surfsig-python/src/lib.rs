@@ -5,6 +5,7 @@ mod e57;
 mod extract;
 mod field;
 mod frame;
+mod odometry;
 mod primitive;
 mod python_file;
 mod surface_index;
@@ -62,6 +63,8 @@ mod _surfsig {
     use crate::field::{field_distinctiveness, field_signatures};
     #[pymodule_export]
     use crate::frame::Frame;
+    #[pymodule_export]
+    use crate::odometry::Odometry;
     #[pymodule_export]
     use crate::primitive::{Primitive, fit_primitive};
     #[pymodule_export]

@@ -47,7 +47,7 @@ impl GicpCloud {
             .with_min_len(PART)
             .map_init(Vec::new, |found, &point| {
                 tree.nearest_k(point, NEIGHBORS, found);
-                normal_of(found.iter().map(|&(_, index)| points[index as usize]))
+                plane_of(found.iter().map(|&(_, index)| points[index as usize])).normal
             })
             .collect();
         Self { points, normals, tree }
@@ -100,7 +100,7 @@ impl GicpCloud {
 pub(crate) trait GicpTarget: Sync {
     /// The number of the nearest point within a reach.
     fn nearest(&self, at: [f64; 3], reach: f64) -> Option<u32>;
-    /// The point of a number, and its unit normal, of which the side is open.
+    /// The point of a number, and its unit normal, of which the side is open; 0 where it is on no plane.
     fn surface(&self, number: u32) -> ([f64; 3], [f64; 3]);
 }
 
@@ -114,18 +114,35 @@ impl GicpTarget for GicpCloud {
     }
 }
 
-/// The direction in which points extend least; the first of them is the one that the normal is for.
-pub(crate) fn normal_of(points: impl Iterator<Item = [f64; 3]> + Clone) -> [f64; 3] {
-    let Some(first) = points.clone().next().map(Vector3::from) else { return [0.0, 0.0, 1.0] };
-    let (mut count, mut sum, mut products) = (0.0, Vector3::zeros(), Matrix3::zeros());
+/// The plane along which points extend.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Plane {
+    /// Unit normal, of which the side is open.
+    pub normal: [f64; 3],
+    /// Standard deviation along the normal over the smaller one within the plane: 0 of a plane, 1 of a ball or a line.
+    pub thickness: f64,
+}
+
+/// The plane of points, of which the first is the one that it is for.
+pub(crate) fn plane_of(points: impl Iterator<Item = [f64; 3]> + Clone) -> Plane {
+    let first = points.clone().next().map_or_else(Vector3::zeros, Vector3::from);
+    let (mut count, mut sum, mut products) = (0.0_f64, Vector3::zeros(), Matrix3::zeros());
     // From the first point, where sums lose nothing at large coordinates.
     for offset in points.map(|point| Vector3::from(point) - first) {
         count += 1.0;
         sum += offset;
         products += offset * offset.transpose();
     }
-    let eigen = SymmetricEigen::new(products / count - sum * sum.transpose() / (count * count));
-    eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned().into()
+    let mean = sum / count.max(1.0);
+    let eigen = SymmetricEigen::new(products / count.max(1.0) - mean * mean.transpose());
+    let least = eigen.eigenvalues.imin();
+    let within = eigen.eigenvalues.iter().enumerate().filter(|(k, _)| *k != least);
+    let smaller = within.fold(f64::INFINITY, |smaller, (_, value)| smaller.min(*value));
+    let thickness = (eigen.eigenvalues[least].max(0.0) / smaller).sqrt();
+    Plane {
+        normal: eigen.eigenvectors.column(least).into_owned().into(),
+        thickness: if smaller > 0.0 { thickness } else { 1.0 },
+    }
 }
 
 /// How [`gicp`] searches; lengths are in the unit of the points.

@@ -128,7 +128,7 @@ impl Keyframes {
                 map.add(keyframe.points.iter().map(moved), keyframe.number);
             }
         }
-        map.keep_within(center, distance, 0.0);
+        map.keep_within(center, distance);
         map
     }
 }

@@ -2,7 +2,7 @@
 
 use super::settings::MapSettings;
 use super::voxel_index::{Nearest, VoxelIndex, squared_distance};
-use crate::alignment::{GicpTarget, normal_of};
+use crate::alignment::{GicpTarget, plane_of};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -19,7 +19,9 @@ const CELL: f64 = 16.0;
 #[derive(Debug, Clone)]
 pub(super) struct LocalMap {
     neighbors: usize,
+    max_thickness: f64,
     points: Vec<[f64; 3]>,
+    /// Unit normals; 0 where neighbours are on no plane, as at edges and in thickets.
     normals: Vec<[f64; 3]>,
     /// Number of the scan that each point came from.
     scans: Vec<u32>,
@@ -34,6 +36,7 @@ impl LocalMap {
     pub fn new(settings: &MapSettings) -> Self {
         Self {
             neighbors: settings.normal_neighbors,
+            max_thickness: settings.max_thickness,
             points: Vec::new(),
             normals: Vec::new(),
             scans: Vec::new(),
@@ -51,9 +54,9 @@ impl LocalMap {
         &self.points
     }
 
-    /// Unit normals, of which the side is open.
-    pub fn normals(&self) -> &[[f64; 3]] {
-        &self.normals
+    /// The unit normal of a point, of which the side is open; `None` where its neighbours are on no plane.
+    pub fn normal(&self, number: u32) -> Option<[f64; 3]> {
+        Some(self.normals[number as usize]).filter(|normal| *normal != [0.0; 3])
     }
 
     pub fn scans(&self) -> &[u32] {
@@ -104,7 +107,9 @@ impl LocalMap {
                 self.index.nearest_k(&self.points, self.points[*number as usize], self.neighbors, found);
                 let reach =
                     if found.len() < self.neighbors { f64::INFINITY } else { found[found.len() - 1].0 };
-                (normal_of(found.iter().map(|(_, index)| self.points[*index as usize])), reach)
+                let plane = plane_of(found.iter().map(|(_, index)| self.points[*index as usize]));
+                let is_thin = plane.thickness <= self.max_thickness;
+                (if is_thin { plane.normal } else { [0.0; 3] }, reach)
             })
             .collect();
         for (number, (normal, reach)) in numbers.into_iter().zip(made) {
@@ -122,12 +127,11 @@ impl LocalMap {
         });
     }
 
-    /// Takes out what is farther from a point, once that is more than a share of all.
-    pub fn keep_within(&mut self, center: [f64; 3], distance: f64, largest_share_beyond: f64) {
+    /// Takes out what is farther from a point. Far points are sparse, so their normals are poor.
+    pub fn keep_within(&mut self, center: [f64; 3], distance: f64) {
         let is_near = |point: &[f64; 3]| squared_distance(point, &center) <= distance * distance;
         let near: Vec<bool> = self.points.iter().map(is_near).collect();
-        let beyond = near.iter().filter(|near| !**near).count();
-        if beyond as f64 <= largest_share_beyond * near.len() as f64 {
+        if near.iter().all(|near| *near) {
             return;
         }
         keep(&mut self.points, &near);
@@ -181,17 +185,18 @@ mod tests {
         map
     }
 
-    /// The largest sine of an angle between normals of a map and those that are made of all its points at once.
+    /// The largest difference between normals of a map and those that are made of all its points at once.
     fn largest_error_of_normals(map: &LocalMap) -> f64 {
         let tree = KdTree::new(map.points());
         let mut found = Vec::new();
         let error = |(point, normal): (&[f64; 3], &[f64; 3])| {
             tree.nearest_k(*point, 20, &mut found);
-            let expected = normal_of(found.iter().map(|(_, index)| map.points()[*index as usize]));
-            let cosine: f64 = (0..3).map(|k| expected[k] * normal[k]).sum();
-            (1.0 - cosine * cosine).max(0.0).sqrt()
+            let plane = plane_of(found.iter().map(|(_, index)| map.points()[*index as usize]));
+            let expected = if plane.thickness <= 0.35 { plane.normal } else { [0.0; 3] };
+            let along: f64 = (0..3).map(|k| expected[k] * normal[k]).sum();
+            (0..3).map(|k| (normal[k] - expected[k].copysign(expected[k] * along)).abs()).fold(0.0, f64::max)
         };
-        map.points().iter().zip(map.normals()).map(error).fold(0.0, f64::max)
+        map.points().iter().zip(&map.normals).map(error).fold(0.0, f64::max)
     }
 
     proptest! {
@@ -215,7 +220,7 @@ mod tests {
             };
             prop_assert_eq!(map.len(), expected.len());
             prop_assert_eq!(of(&map), expected.clone());
-            map.keep_within([0.5; 3], distance, 0.0);
+            map.keep_within([0.5; 3], distance);
             expected.retain(|_, (point, _)| squared_distance(point, &[0.5; 3]) <= distance * distance);
             prop_assert_eq!(of(&map), expected);
             // What was taken out may come again, and its voxel is free.
@@ -236,15 +241,5 @@ mod tests {
         ) {
             prop_assert!(largest_error_of_normals(&map_of(&scans)) < 1e-6);
         }
-    }
-
-    #[test]
-    fn a_map_stays_as_it_is_while_little_is_out_of_range() {
-        let line: Vec<[f64; 3]> = (0..100).map(|i| [f64::from(i) + 0.5, 0.0, 0.0]).collect();
-        let mut map = map_of(&[line]);
-        map.keep_within([0.0; 3], 97.0, 0.05);
-        assert_eq!(map.len(), 100);
-        map.keep_within([0.0; 3], 90.0, 0.05);
-        assert_eq!(map.len(), 90);
     }
 }

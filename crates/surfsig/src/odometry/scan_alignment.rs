@@ -82,7 +82,7 @@ pub(super) fn align<F: Fn([f64; 3]) -> bool>(
     Some(ScanAlignment {
         T_map_scan: pose,
         covariance: plane.covariance(),
-        overlap: plane.residuals.len() as f64 / scan.points.len() as f64,
+        overlap: plane.on_map as f64 / scan.points.len() as f64,
         free_space: scan.range_image.free_space_share(samples),
         unexplained: lacking as f64 / known.max(1) as f64,
         observable: plane.is_observable(settings.min_observability),
@@ -101,6 +101,8 @@ struct PointToPlane {
     targets: Vec<u32>,
     /// For each point of the scan, whether the map has it.
     explained: Vec<bool>,
+    /// Inliers, and points beside those of the map that are on no plane.
+    on_map: usize,
     information: Matrix6<f64>,
     gradient: Vector6<f64>,
 }
@@ -115,42 +117,44 @@ impl PointToPlane {
         settings: &ScanAlignmentSettings,
     ) -> Option<Self> {
         let found = correspondences.update(map, &scan.points, pose, settings.max_point_distance);
-        // The residual r = n (p - q) of a moved point p and the map's point q with its normal n.
-        let residual = |other: &Option<(u32, f64)>, point: &[f64; 3]| {
-            let (index, squared) = (*other)?;
+        // The residual r = n (p - q) of a moved point p and the map's point q with its normal n, where it has one.
+        let residual = |index: u32, point: &[f64; 3]| {
             let moved = Vector3::from(pose.transform_point(*point));
-            let normal = Vector3::from(map.normals()[index as usize]);
-            Some((index, squared, normal.dot(&(moved - Vector3::from(map.points()[index as usize])))))
+            let normal = Vector3::from(map.normal(index)?);
+            Some(normal.dot(&(moved - Vector3::from(map.points()[index as usize]))))
         };
-        let near: Vec<Option<(u32, f64, f64)>> =
-            found.iter().zip(&scan.points).map(|(other, point)| residual(other, point)).collect();
-        let sizes: Vec<f64> = near.iter().flatten().map(|(_, _, residual)| residual.abs()).collect();
-        if sizes.len() < settings.min_correspondences {
-            return None;
-        }
-        let deviation = DEVIATIONS_IN_MEDIAN * median(sizes).unwrap_or(0.0);
+        let residuals: Vec<Option<f64>> = found
+            .iter()
+            .zip(&scan.points)
+            .map(|(other, point)| other.and_then(|(index, _)| residual(index, point)))
+            .collect();
+        let sizes: Vec<f64> = residuals.iter().flatten().map(|residual| residual.abs()).collect();
+        let deviation = DEVIATIONS_IN_MEDIAN * median(sizes)?;
         let limit = settings.max_residual.min(settings.max_deviation * deviation.max(settings.min_deviation));
         let beside = settings.explained_distance * settings.explained_distance;
-        let explains = |(_, squared, residual): &(u32, f64, f64)| {
-            residual.abs() < settings.max_residual || *squared < beside
-        };
         let mut plane = Self {
-            design: Vec::with_capacity(near.len()),
-            residuals: Vec::with_capacity(near.len()),
-            points: Vec::with_capacity(near.len()),
-            targets: Vec::with_capacity(near.len()),
-            explained: near.iter().map(|found| found.as_ref().is_some_and(explains)).collect(),
+            design: Vec::with_capacity(found.len()),
+            residuals: Vec::with_capacity(found.len()),
+            points: Vec::with_capacity(found.len()),
+            targets: Vec::with_capacity(found.len()),
+            explained: Vec::with_capacity(found.len()),
+            on_map: 0,
             information: Matrix6::zeros(),
             gradient: Vector6::zeros(),
         };
         let to_scan = pose.inverse();
-        for (found, point) in near.iter().zip(&scan.points) {
-            let Some((index, _, residual)) = *found else { continue };
-            if residual.abs() >= limit {
+        for ((other, residual), point) in found.iter().zip(&residuals).zip(&scan.points) {
+            let is_beside = other.is_some_and(|(_, squared)| squared < beside);
+            let is_inlier = residual.map(|residual| residual.abs() < limit);
+            plane
+                .explained
+                .push(is_beside || residual.is_some_and(|residual| residual.abs() < settings.max_residual));
+            plane.on_map += usize::from(is_inlier.unwrap_or(is_beside));
+            let (Some(true), Some((index, _)), Some(residual)) = (is_inlier, *other, *residual) else {
                 continue;
-            }
+            };
             // d r / d (w, v) of the pose T exp(w, v) is (p x n, n) in the scan's axes.
-            let normal = Vector3::from(to_scan.transform_vector(map.normals()[index as usize]));
+            let normal = Vector3::from(to_scan.transform_vector(map.normal(index).unwrap_or_default()));
             let torque = Vector3::from(*point).cross(&normal);
             plane.design.push([torque.x, torque.y, torque.z, normal.x, normal.y, normal.z]);
             plane.residuals.push(residual);

@@ -2,11 +2,11 @@
 
 use super::scale::{distances, median_point};
 use super::settings::OdometrySettings;
+use crate::Scan;
 use crate::alignment::GicpCloud;
 use crate::scan::median;
 use crate::visibility::SphericalRangeImage;
 use crate::voxels::voxel_means;
-use crate::{PointCloud, Scan};
 
 /// Coordinates beyond which the square of a distance leaves float64.
 const FARTHEST: f64 = 1e150;
@@ -80,6 +80,7 @@ impl SensorPosition {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::PointCloud;
 
     fn around(middle: [f64; 3]) -> Vec<[f64; 3]> {
         (0..27).map(|i| [0, 1, 2].map(|k| middle[k] + f64::from(i / 3_i32.pow(k as u32) % 3) - 1.0)).collect()

@@ -10,7 +10,7 @@ use super::settings::OdometrySettings;
 use super::statistics::quantile;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector3};
 
 /// Share of a scan's points that the map's range is taken from.
 const MOST: f64 = 0.99;
@@ -245,9 +245,11 @@ impl Tracker {
         }
         let Some(step) = steps.last().filter(|_| self.has_moved(&pose)) else { return steps };
         let number = step.number as u32;
-        self.map.add(scan.points.iter().map(|point| pose.transform_point(*point)), number);
-        let largest_share = self.settings.map.max_share_out_of_range;
-        self.map.keep_within(pose.translation.into(), self.map_range, largest_share);
+        // First of all what leaves: new points need no normals that are made with it.
+        self.map.keep_within(pose.translation.into(), self.map_range);
+        let is_near = |point: &&[f64; 3]| Vector3::from(**point).norm() <= self.map_range;
+        let near = scan.points.iter().filter(is_near).map(|point| pose.transform_point(*point));
+        self.map.add(near, number);
         self.mapped.resize(step.number + 1, None);
         self.mapped[step.number] = Some((pose, step.covariance));
         self.keyframes.offer(scan, &pose, number);
