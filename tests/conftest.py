@@ -1,6 +1,9 @@
 """What several test modules need."""
 
 import os
+import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from c_interface import CInterface
 from numpy.typing import NDArray
 
 from surfsig.files import write
@@ -62,3 +66,30 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
     }
     write(path, PointCloud(points, viewpoint=np.zeros(3), fields=fields))
     return path
+
+
+@pytest.fixture(scope="session")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder that the C interface was installed into."""
+    if sys.platform == "win32":
+        pytest.skip("these tests call compilers in the way of Unix")
+    for tool in ("cargo", "cmake", "cc", "c++"):
+        if shutil.which(tool) is None:
+            pytest.skip(f"{tool} is not installed")
+    source = Path(__file__).parents[1] / "crates" / "surfsig-c"
+    build, prefix = tmp_path_factory.mktemp("build"), tmp_path_factory.mktemp("prefix")
+    for arguments in (
+        ["-S", source, "-B", build],
+        ["--build", build],
+        ["--install", build, "--prefix", prefix],
+    ):
+        finished = subprocess.run(["cmake", *map(str, arguments)], capture_output=True, text=True)
+        assert finished.returncode == 0, finished.stdout + finished.stderr
+    return prefix
+
+
+@pytest.fixture(scope="session")
+def c(installed: Path) -> CInterface:
+    """The functions of the installed library."""
+    library = f"libsurfsig_c.{'dylib' if sys.platform == 'darwin' else 'so'}"
+    return CInterface(installed / "lib" / library, installed / "include" / "surfsig.h")

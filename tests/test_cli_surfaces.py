@@ -131,7 +131,7 @@ def test_what_recurs(shell: Shell, tmp_path: Path) -> None:
     values = json.loads((tmp_path / "out.json").read_text())["recurrences"]
     members = values["groups"][0]["members"]
     assert [member["piece"] for member in members] == [0, 1, 2, 3]
-    assert [direction["motion"] for direction in values["groups"][0]["free_directions"]] == ["turn"]
+    assert [direction["motion"] for direction in values["groups"][0]["free_directions"]] == ["rotation"]
     (equal,) = values["equal_surfaces"]
     first, other = (values["pieces"][number]["center"] for number in (0, 1))
     moved = np.array(members[1]["pose"]) @ [*first, 1.0]

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 import surfsig
-from surfsig import InvalidInputError, _surfsig
-from surfsig.field.keypoint_selection import _apart, _spread
+from surfsig import InvalidInputError
 
 Array = NDArray[np.float64]
 
@@ -83,16 +82,12 @@ def test_of_keypoints_more_matches_are_right_than_of_random_points() -> None:
     assert shares[0] > 1.5 * shares[1]
 
 
-def test_places_are_spread_by_the_distance_to_the_nearest_before() -> None:
-    places = np.random.default_rng(4).normal(size=(300, 3))
-    order = _spread(places)
-    before = [np.inf] + [np.linalg.norm(places[i] - places[:i], axis=1).min() for i in range(1, 300)]
-    np.testing.assert_array_equal(order, np.argsort(-np.array(before), kind="stable"))
-
-
-def test_places_apart_are_the_first_that_are_free() -> None:
-    places = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [1.5, 0.0, 0.0], [2.0, 0.0, 0.0]])
-    assert _apart(places, 1.0).tolist() == [0, 2]
+def test_threads_do_not_matter() -> None:
+    one, two = (surfsig.find_keypoints(scan(), RADIUS, count=60, viewpoint=VIEW, threads=n) for n in (1, 2))
+    np.testing.assert_array_equal(one.indices, two.indices)
+    np.testing.assert_array_equal(one.vectors, two.vectors)
+    matches = [surfsig.match_fields(one, two, threads=n) for n in (1, 2)]
+    np.testing.assert_array_equal(matches[0].poses, matches[1].poses)
 
 
 def test_nothing_is_chosen_of_nothing() -> None:
@@ -104,17 +99,3 @@ def test_count_and_spacing_exclude_each_other() -> None:
         surfsig.find_keypoints(scan(), RADIUS, count=3, spacing=0.1)
     with pytest.raises(InvalidInputError, match="count must be"):
         surfsig.find_keypoints(scan(), RADIUS, count=0)
-
-
-def test_places_near_each_other_do_not_make_each_other_common() -> None:
-    found = surfsig.find_keypoints(scan(), RADIUS, count=60, viewpoint=VIEW)
-    vectors, places = found.vectors, found.points.astype(np.float64)
-    given = _surfsig.field_distinctiveness(vectors, places, radius=RADIUS, threads=1)
-    apart = np.linalg.norm(places[:, None] - places, axis=2) >= RADIUS
-    between = np.where(apart, np.linalg.norm(vectors[:, None] - vectors, axis=2), 2.0)
-    np.testing.assert_allclose(given, np.sort(between, axis=1)[:, :5].mean(axis=1), atol=1e-4)
-    np.testing.assert_array_equal(
-        given, _surfsig.field_distinctiveness(vectors, places, radius=RADIUS, threads=3)
-    )
-    with pytest.raises(InvalidInputError, match="60 vectors for 59 places"):
-        _surfsig.field_distinctiveness(vectors, places[:59], radius=RADIUS)

@@ -42,7 +42,7 @@ PYTHON_EXCEPTIONS = {
 RUST_FLOORS = (
     ("error",),
     ("geometry", "similarity", "point_cloud", "threads", "moments", "monitor", "status"),
-    ("lattice", "resolution", "depth_image", "kd_tree", "voxels", "scan"),
+    ("lattice", "resolution", "depth_image", "visibility", "kd_tree", "voxels", "scan"),
     ("simd",),
     ("cell_index", "surface_index", "tensor"),
     ("ball", "curvature"),
@@ -51,7 +51,7 @@ RUST_FLOORS = (
     ("extract",),
     ("field", "primitive", "orientation"),
     ("surfaces", "alignment"),
-    ("registration",),
+    ("registration", "odometry"),
 )
 """Modules of the core, the lowest floor first."""
 

@@ -83,7 +83,7 @@ def test_equal_cylinders_are_brought_axis_to_axis() -> None:
     scan = found(surface("cylinder", 0.02, 1e-5), surface("cylinder", 0.02001, 1e-5, axis=tilted))
     (group,) = equal_surfaces([scan], 0.99)
     assert abs(group.poses[1][:3, :3] @ [0, 0, 1] @ tilted) == pytest.approx(1.0)
-    assert [direction.motion for direction in group.free_directions] == ["turn", "slide"]
+    assert [direction.motion for direction in group.free_directions] == ["rotation", "translation"]
 
 
 def test_cones_are_equal_by_their_angle_and_meet_at_their_apex() -> None:
@@ -124,7 +124,7 @@ def test_free_directions_of_points_on_simple_surfaces() -> None:
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     center = np.array([0.3, -0.2, 0.5])
     (turn,) = free_directions(center + 0.02 * directions, directions)
-    assert turn.motion == "turn"
+    assert turn.motion == "rotation"
     np.testing.assert_allclose(turn.point, center, atol=1e-9)
     assert np.isnan(turn.axis).all()
 
@@ -134,16 +134,20 @@ def test_free_directions_of_points_on_simple_surfaces() -> None:
     heights = rng.uniform(-0.03, 0.03, 400)
     rod = center + 0.02 * around + np.outer(heights, [0, 0, 1])
     turn, slide = free_directions(rod, around)
-    assert (turn.motion, slide.motion) == ("turn", "slide")
+    assert (turn.motion, slide.motion) == ("rotation", "translation")
     np.testing.assert_allclose(np.abs([turn.axis, slide.axis]), [[0, 0, 1]] * 2, atol=1e-6)
     np.testing.assert_allclose(turn.point[:2], center[:2], atol=1e-7)
 
     # A cone's normals lean towards its axis: it cannot slide.
     narrowing = center + (0.02 + heights)[:, None] * around + np.outer(heights, [0, 0, 1])
     leaning = (around - [0, 0, 1]) / np.sqrt(2.0)
-    assert directions_of(narrowing, leaning) == ["turn"]
+    assert directions_of(narrowing, leaning) == ["rotation"]
     flat = np.column_stack([rng.uniform(-1, 1, (400, 2)), np.zeros(400)])
-    assert directions_of(flat, np.tile([0.0, 0.0, 1.0], (400, 1))) == ["turn", "slide", "slide"]
+    assert directions_of(flat, np.tile([0.0, 0.0, 1.0], (400, 1))) == [
+        "rotation",
+        "translation",
+        "translation",
+    ]
     # Three faces of a box leave nothing free.
     faces = np.concatenate([np.roll(flat, k, axis=1) for k in range(3)])
     assert directions_of(faces, np.repeat(np.eye(3)[[2, 0, 1]], 400, axis=0)) == []
@@ -154,9 +158,9 @@ def test_free_directions_are_named() -> None:
         free_directions_of_surface(kind, np.zeros(3), np.array([0.0, 0.0, 1.0]))
         for kind in ("sphere", "cylinder")
     )
-    assert [str(direction) for direction in ball] == ["turns about (0, 0, 0)"]
+    assert [str(direction) for direction in ball] == ["rotates about (0, 0, 0)"]
     assert [str(direction) for direction in rod] == [
-        "turns about the axis (0, 0, 1) through (0, 0, 0)",
+        "rotates about the axis (0, 0, 1) through (0, 0, 0)",
         "slides along (0, 0, 1)",
     ]
 

@@ -108,9 +108,9 @@ def test_a_plane_slides_and_turns() -> None:
     flat = [np.column_stack([rng.uniform(-1, 1, (8000, 2)), 0.002 * rng.normal(size=8000)]) for _ in "ab"]
     found = surfsig.register(flat[0], flat[1], init=np.eye(4))
     assert not found.trusted
-    assert sorted(free.motion for free in found.free_directions) == ["slide", "slide", "turn"]
+    assert sorted(free.motion for free in found.free_directions) == ["rotation", "translation", "translation"]
     for free in found.free_directions:
-        assert abs(free.axis[2]) == pytest.approx(float(free.motion == "turn"), abs=0.02)
+        assert abs(free.axis[2]) == pytest.approx(float(free.motion == "rotation"), abs=0.02)
 
 
 def test_a_pipe_slides_along_its_axis() -> None:
@@ -122,7 +122,7 @@ def test_a_pipe_slides_along_its_axis() -> None:
         pipes.append(np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height]))
     found = surfsig.register(pipes[0], pipes[1], init=np.eye(4))
     assert not found.trusted
-    assert sorted(free.motion for free in found.free_directions) == ["slide", "turn"]
+    assert sorted(free.motion for free in found.free_directions) == ["rotation", "translation"]
     assert all(abs(free.axis[2]) > 0.999 for free in found.free_directions)
 
 
@@ -166,8 +166,8 @@ def test_a_cloud_is_moved_with_its_viewpoint_and_normals(
         viewpoint=source.viewpoint,
         fields={"nx": np.ones(5), "ny": np.zeros(5), "nz": np.zeros(5), "intensity": np.arange(5)},
     )
-    there = found.moved(named)
-    np.testing.assert_allclose(there.points, found.apply(source.points[:5]), atol=1e-9)
+    there = found.transform_cloud(named)
+    np.testing.assert_allclose(there.points, found.transform_points(source.points[:5]), atol=1e-9)
     assert there.viewpoint is not None
     np.testing.assert_allclose(there.viewpoint, ABOVE, atol=0.01)
     turned = np.column_stack([there.fields[name] for name in ("nx", "ny", "nz")])

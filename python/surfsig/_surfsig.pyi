@@ -1,7 +1,7 @@
 """The compiled core: what it offers to the package."""
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, BinaryIO, ClassVar, final
+from typing import Any, BinaryIO, Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,26 +13,38 @@ __all__ = [
     "INSTRUCTION_SET",
     "KIND_PARAMETERS",
     "OPTIMAL",
+    "SCAN_STATUS_NAMES",
     "STATUS_NAMES",
     "DepthImage",
     "E57Reader",
     "Frame",
     "Odometry",
     "Primitive",
+    "RegistrationSettings",
     "SurfaceIndex",
     "SurfacePlaces",
     "__version__",
+    "consistent_directions",
     "coordinate_steps",
     "extract",
-    "field_distinctiveness",
+    "field_keypoints",
     "field_signatures",
     "find_surfaces",
     "fit_primitive",
+    "free_directions",
+    "match_fields",
+    "register",
     "voxel_representatives",
     "write_e57",
 ]
 
+_Scan = tuple[NDArray[np.floating], list[float], list[float] | None, NDArray[np.float32] | None]
+_Places = tuple[
+    NDArray[np.float64], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]
+]
+
 __version__: str
+SCAN_STATUS_NAMES: list[str]
 STATUS_NAMES: list[str]
 KIND_PARAMETERS: dict[str, int]
 FEWEST_SURFACE_POINTS: int
@@ -69,12 +81,119 @@ def field_signatures(
     progress: Callable[[int, int], object] | None = None,
     pools: bool = False,
 ) -> dict[str, NDArray[Any]]: ...
-def field_distinctiveness(
-    vectors: NDArray[np.float32],
-    places: NDArray[np.float64],
+def field_keypoints(
+    points: NDArray[np.floating],
     *,
+    origin: Sequence[float],
     radius: float,
+    count: int | None = None,
+    spacing: float | None = None,
+    viewpoint: Sequence[float] | None = None,
+    directions: NDArray[np.float32] | None = None,
     threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> dict[str, NDArray[Any]]: ...
+def match_fields(
+    source: _Places, target: _Places, *, mutual: bool, threads: int | None = None
+) -> dict[str, NDArray[Any]]: ...
+
+@final
+class RegistrationSettings:
+    """How scans are registered, for experts: what is not given keeps its default.
+
+    The crate's `RegistrationSettings` says why each has its value.
+    """
+
+    def __new__(
+        cls,
+        *,
+        radius_share: float | None = None,
+        keypoints: int | None = None,
+        candidates_per_radius: float | None = None,
+        voxels_per_radius: float | None = None,
+        orientation_voxels_per_radius: float | None = None,
+        consensus_max_distance: float | None = None,
+        consensus_min_cosine: float | None = None,
+        consensus_proposals: int | None = None,
+        gicp_distances: Sequence[float] | None = None,
+        gicp_iterations: int | None = None,
+        surface_max_distance: float | None = None,
+        surface_max_deviations: float | None = None,
+        surface_max_iterations: int | None = None,
+        max_points: int | None = None,
+        trusted_inliers: int | None = None,
+        trusted_overlap: float | None = None,
+        trusted_overlap_of_start: float | None = None,
+    ) -> RegistrationSettings: ...
+    @property
+    def radius_share(self) -> float:
+        """Radius of the patches over the median distance of a scan's points from their middle."""
+    @property
+    def keypoints(self) -> int:
+        """Keypoints of each scan."""
+    @property
+    def candidates_per_radius(self) -> float:
+        """Candidates for keypoints along a patch's radius."""
+    @property
+    def voxels_per_radius(self) -> float:
+        """Voxels along a patch's radius, to which scans are thinned before they are refined."""
+    @property
+    def orientation_voxels_per_radius(self) -> float:
+        """The same where normals are oriented by their neighbours, because no viewpoint is known."""
+    @property
+    def consensus_max_distance(self) -> float:
+        """Radii of a patch between a moved place and its correspondence within which a match agrees."""
+    @property
+    def consensus_min_cosine(self) -> float:
+        """Smallest cosine between their axes, likewise."""
+    @property
+    def consensus_proposals(self) -> int:
+        """Matches whose transforms are tried, the most similar first."""
+    @property
+    def gicp_distances(self) -> list[float]:
+        """Largest distances between correspondences in the two rounds of generalised ICP, in voxels."""
+    @property
+    def gicp_iterations(self) -> int:
+        """Steps of each round, at most."""
+    @property
+    def surface_max_distance(self) -> float:
+        """Voxels from the target's nearest point beyond which there is no surface to measure from."""
+    @property
+    def surface_max_deviations(self) -> float:
+        """Standard deviations within which a residual is an inlier."""
+    @property
+    def surface_max_iterations(self) -> int:
+        """Steps of the last fit, at most."""
+    @property
+    def max_points(self) -> int:
+        """Points of the source in the last fit, at most."""
+    @property
+    def trusted_inliers(self) -> int:
+        """Matches that agree, from which on a transform is trusted."""
+    @property
+    def trusted_overlap(self) -> float:
+        """Overlap from which on it is."""
+    @property
+    def trusted_overlap_of_start(self) -> float:
+        """Overlap from which on a transform is trusted that the caller gave roughly."""
+    def __eq__(self, other: object) -> bool: ...
+
+def register(
+    source: _Scan,
+    target: _Scan,
+    *,
+    start: list[list[float]] | None = None,
+    radius: float | None = None,
+    keypoints: int | None = None,
+    settings: RegistrationSettings | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> dict[str, Any]: ...
+def free_directions(
+    points: NDArray[np.float64], normals: NDArray[np.float64]
+) -> list[tuple[Literal["rotation", "translation"], list[float] | None, list[float] | None]]: ...
+def consistent_directions(
+    points: NDArray[np.float64], *, voxel: float, threads: int | None = None
 ) -> NDArray[np.float32]: ...
 def find_surfaces(
     points: NDArray[np.floating],
@@ -182,7 +301,6 @@ class Frame:
 
 @final
 class Odometry:
-    STATUS_NAMES: ClassVar[list[str]]
     def __new__(
         cls,
         *,

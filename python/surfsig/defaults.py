@@ -62,11 +62,5 @@ RECURRENCE_SEED = 0
 KEYPOINTS = 1000
 """Places that `surfsig.find_keypoints` chooses, where neither number nor distance is asked for."""
 
-KEYPOINT_CANDIDATES = 8.0
-"""Of them, across a patch's radius, from which it chooses."""
-
-REGISTRATION_KEYPOINTS = 1000
-"""Of each scan that is registered."""
-
 INSTANCE_SCORE = 0.25
 """Of a model in a scene, at least: half hidden ones have about 0.4, and what is not there below 0.2."""

@@ -1,12 +1,15 @@
 /**
  * @file
- * surfsig in C: curvature and surface signatures of point clouds.
+ * surfsig in C: curvature, surface signatures and surfaces of point clouds.
  *
  * Every function that can fail returns a surfsig_code; where it is not SURFSIG_CODE_OK, surfsig_last_error()
  * says in one line what is wrong. Lengths are in the cloud's own unit, curvatures per that unit; NaN where
  * there is no value. Functions may be called from several threads at once; one options object must not be
  * changed by one thread while another uses it. Null is allowed where a comment says so, and is an error,
- * never a crash, elsewhere.
+ * never a crash, elsewhere; so are a count that no memory holds, a stride that is too small, a number that no
+ * enum has, and coordinates that are not finite.
+ *
+ * A query is a point at which something is asked for: a point of the cloud, or a position of its own.
  *
  * Generated from the Rust sources by cbindgen: `make header` makes it anew.
  */
@@ -16,6 +19,11 @@
 
 #include <stddef.h>
 #include <stdint.h>
+
+/**
+ * Numbers of a set of moments.
+ */
+#define SURFSIG_MOMENTS 35
 
 /**
  * Numbers of a signature.
@@ -35,14 +43,59 @@ typedef enum {
    */
   SURFSIG_CODE_INVALID_INPUT = 1,
   /**
-   * The operating system refused the threads.
+   * The operating system refused threads or memory.
    */
   SURFSIG_CODE_SYSTEM = 2,
   /**
    * A bug in surfsig: please report it with the text of surfsig_last_error().
    */
   SURFSIG_CODE_INTERNAL = 3,
+  /**
+   * The points do not determine what was to be fitted: they are too few, or lie on a curve.
+   */
+  SURFSIG_CODE_UNDETERMINED = 4,
+  /**
+   * The progress function asked to stop.
+   */
+  SURFSIG_CODE_CANCELLED = 5,
 } surfsig_code;
+
+/**
+ * What a surface is.
+ */
+enum surfsig_surface_kind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * A plane.
+   */
+  SURFSIG_SURFACE_KIND_PLANE = 0,
+  /**
+   * A sphere.
+   */
+  SURFSIG_SURFACE_KIND_SPHERE = 1,
+  /**
+   * A circular cylinder.
+   */
+  SURFSIG_SURFACE_KIND_CYLINDER = 2,
+  /**
+   * A circular cone, one nappe of it.
+   */
+  SURFSIG_SURFACE_KIND_CONE = 3,
+  /**
+   * A torus.
+   */
+  SURFSIG_SURFACE_KIND_TORUS = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum surfsig_surface_kind surfsig_surface_kind;
+#else
+typedef uint8_t surfsig_surface_kind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
 
 /**
  * What became of a point. Everything but SURFSIG_STATUS_OK says why values are missing or weak.
@@ -110,9 +163,66 @@ typedef enum {
 } surfsig_axes;
 
 /**
- * What an extraction gives: columns of one length, in the order of the places. Made by
- * surfsig_extract_f32() or surfsig_extract_f64(), freed by surfsig_extraction_free(). It refers to
- * nothing of the caller's.
+ * Which surface is fitted to the points of a neighbourhood.
+ */
+typedef enum {
+  /**
+   * The paper's paraboloid, eq. (5): the smallest spread, and a bias where the ball is not small against the radius
+   * of curvature.
+   */
+  SURFSIG_FIT_PARABOLOID = 0,
+  /**
+   * A general quadric with Taubin's normalisation: exact on spheres, cylinders, cones and ellipsoids of any size,
+   * where they rise out of the noise; the paraboloid elsewhere.
+   */
+  SURFSIG_FIT_QUADRIC = 1,
+  /**
+   * For each query what errs less.
+   */
+  SURFSIG_FIT_AUTO = 2,
+} surfsig_fit;
+
+/**
+ * Whose curvature a query has.
+ */
+enum surfsig_fit_used
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * There is no curvature.
+   */
+  SURFSIG_FIT_USED_NONE = 0,
+  /**
+   * The paraboloid's.
+   */
+  SURFSIG_FIT_USED_PARABOLOID = 1,
+  /**
+   * The quadric's.
+   */
+  SURFSIG_FIT_USED_QUADRIC = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum surfsig_fit_used surfsig_fit_used;
+#else
+typedef uint8_t surfsig_fit_used;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Points of the caller's. Made by surfsig_cloud_new_f32() or surfsig_cloud_new_f64(), freed by
+ * surfsig_cloud_free().
+ *
+ * Packed points are used where they are: they must neither change nor go as long as the cloud is used. Points with
+ * other bytes between them are copied.
+ */
+typedef struct surfsig_cloud surfsig_cloud;
+
+/**
+ * What an extraction gives: columns of one length, in the order of the queries. Made by surfsig_extract() and the
+ * like, freed by surfsig_extraction_free(). It refers to nothing of the caller's.
  */
 typedef struct surfsig_extraction surfsig_extraction;
 
@@ -120,6 +230,139 @@ typedef struct surfsig_extraction surfsig_extraction;
  * How an extraction is done. Made by surfsig_options_new(), freed by surfsig_options_free().
  */
 typedef struct surfsig_options surfsig_options;
+
+/**
+ * A plane, sphere, cylinder, cone or torus without a boundary. Made by surfsig_fit_primitive(), freed by
+ * surfsig_primitive_free(). It refers to nothing of the caller's.
+ */
+typedef struct surfsig_primitive surfsig_primitive;
+
+/**
+ * How surfaces are found. Made by surfsig_surface_options_new(), freed by surfsig_surface_options_free().
+ */
+typedef struct surfsig_surface_options surfsig_surface_options;
+
+/**
+ * The surfaces of a scan, the one with most points first: columns of one length, and for each point of the cloud the
+ * number of its surface. Made by surfsig_find_surfaces(), freed by surfsig_surfaces_free(). It refers to nothing of
+ * the caller's.
+ */
+typedef struct surfsig_surfaces surfsig_surfaces;
+
+/**
+ * A sphere, in the coordinates of the moments.
+ */
+typedef struct {
+  /**
+   * x, y, z of the centre.
+   */
+  double centre[3];
+  /**
+   * Radius.
+   */
+  double radius;
+  /**
+   * Root mean square of the points' distances, to first order.
+   */
+  double residual;
+} surfsig_sphere;
+
+/**
+ * A cylinder, in the coordinates of the moments.
+ */
+typedef struct {
+  /**
+   * Unit vector along the axis; the sign means nothing.
+   */
+  double axis[3];
+  /**
+   * The point of the axis next to the points' mean.
+   */
+  double centre[3];
+  /**
+   * Radius.
+   */
+  double radius;
+  /**
+   * Root mean square of the points' distances, to first order.
+   */
+  double residual;
+} surfsig_cylinder;
+
+/**
+ * The surface Q = 0 of a polynomial of second degree, in the coordinates of the moments.
+ */
+typedef struct {
+  /**
+   * Of 1, x, y, z, xx, xy, xz, yy, yz, zz. The mean square of the gradient over the points is 1, so that Q is about
+   * the distance from the surface.
+   */
+  double coefficients[10];
+  /**
+   * Root mean square of the points' distances, to first order.
+   */
+  double residual;
+  /**
+   * By how much the next best quadric's mean square exceeds this one's, less where points are few. Below 4, as on a
+   * plane, the points do not tell which quadric they lie on.
+   */
+  double gap;
+  /**
+   * Root mean square of the points' distances from their mean.
+   */
+  double extent;
+} surfsig_quadric;
+
+/**
+ * What a surface is at one of its points.
+ */
+typedef struct {
+  /**
+   * Where it is.
+   */
+  double position[3];
+  /**
+   * Unit normal, along the gradient of Q.
+   */
+  double normal[3];
+  /**
+   * Larger principal curvature; positive where the surface falls away from the normal.
+   */
+  double k1;
+  /**
+   * Smaller principal curvature.
+   */
+  double k2;
+  /**
+   * Unit tangent along k1; the sign means nothing.
+   */
+  double direction[3];
+} surfsig_surface_point;
+
+/**
+ * Told how far work is, some twenty times a second, by the thread that called surfsig; the work itself is done by
+ * others meanwhile. Must return, neither by an exception nor by longjmp().
+ *
+ * @param data What was given with the function.
+ * @param done How much is done.
+ * @param total Of how much; the same for all calls.
+ * @return 0 to go on; anything else stops the work, whose function then returns SURFSIG_CODE_CANCELLED.
+ */
+typedef int (*surfsig_progress)(void *data, size_t done, size_t total);
+
+/**
+ * A rotation and a translation: a point p of the source is at R p + t of the target. Written T_target_source, so that
+ * T_a_b T_b_c = T_a_c.
+ *
+ * The matrix is that of Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(transform.matrix), and its
+ * transpose that of a column-major matrix. A twist is a rotation vector in radians, and then a translation.
+ */
+typedef struct {
+  /**
+   * R and t, and 0, 0, 0, 1: 4 x 4, row by row.
+   */
+  double matrix[16];
+} surfsig_transform;
 
 #ifdef __cplusplus
 extern "C" {
@@ -131,6 +374,49 @@ extern "C" {
 const char *surfsig_version(void);
 
 /**
+ * Makes a cloud of points in single precision.
+ *
+ * Points that are not finite keep their numbers, belong to no neighbourhood, and get SURFSIG_STATUS_NOT_FINITE.
+ *
+ * @param points x of the first point; its y and z follow it. May have any alignment; null only if count is 0.
+ * @param count Number of points, at most 4294967295.
+ * @param stride Bytes from one point's x to the next one's, at least 12: 12 for packed coordinates,
+ * sizeof(pcl::PointXYZ) and the like otherwise.
+ * @param origin x, y, z that are added to each point, finite; null for 0, 0, 0.
+ * @param cloud Where the result is put; null is put there where the call fails.
+ */
+surfsig_code surfsig_cloud_new_f32(const float *points,
+                                   size_t count,
+                                   size_t stride,
+                                   const double *origin,
+                                   surfsig_cloud **cloud);
+
+/**
+ * Makes a cloud of points in double precision, as surfsig_cloud_new_f32() does; the stride is at least 24 bytes.
+ *
+ * @param points x of the first point; its y and z follow it. May have any alignment; null only if count is 0.
+ * @param count Number of points, at most 4294967295.
+ * @param stride Bytes from one point's x to the next one's.
+ * @param origin x, y, z that are added to each point, finite; null for 0, 0, 0.
+ * @param cloud Where the result is put; null is put there where the call fails.
+ */
+surfsig_code surfsig_cloud_new_f64(const double *points,
+                                   size_t count,
+                                   size_t stride,
+                                   const double *origin,
+                                   surfsig_cloud **cloud);
+
+/**
+ * Number of points; 0 for null.
+ */
+size_t surfsig_cloud_size(const surfsig_cloud *cloud);
+
+/**
+ * Frees a cloud, not the points; does nothing with null.
+ */
+void surfsig_cloud_free(surfsig_cloud *cloud);
+
+/**
  * One line about the last call of this thread that failed; empty where none has. Never to be freed; valid
  * until the thread's next call that fails.
  */
@@ -139,45 +425,59 @@ const char *surfsig_last_error(void);
 /**
  * Extracts curvature from the points within a radius; eq. (5) of the paper, and from it k1 and k2.
  *
- * Points that are not finite belong to no ball and get SURFSIG_STATUS_NOT_FINITE. No point at all gives an
- * extraction of size 0.
+ * A cloud without points gives an extraction of size 0.
  *
- * @param points x of the first point; its y and z follow it. May have any alignment; null only if count is 0.
- * @param count Number of points.
- * @param stride Bytes from one point's x to the next one's, at least 12: 12 for packed coordinates, which
- * are used where they are; sizeof(pcl::PointXYZ) and the like otherwise, and the coordinates are copied.
- * @param origin x, y, z that are added to each point, finite; null for 0, 0, 0.
- * @param radius Radius of the ball around each place, in the cloud's unit; finite and above 0.
- * @param options How; null for the default.
+ * @param cloud The points.
+ * @param radius Radius of the ball around each query, in the cloud's unit; finite and above 0.
+ * @param options How, and at which queries; null for the default: at every point.
  * @param extraction Where the result is put; null is put there where the call fails.
  */
-surfsig_code surfsig_extract_f32(const float *points,
-                                 size_t count,
-                                 size_t stride,
-                                 const double *origin,
-                                 double radius,
-                                 const surfsig_options *options,
-                                 surfsig_extraction **extraction);
+surfsig_code surfsig_extract(const surfsig_cloud *cloud,
+                             double radius,
+                             const surfsig_options *options,
+                             surfsig_extraction **extraction);
 
 /**
- * Extracts curvature from points in double precision, as surfsig_extract_f32() does; the stride is at
- * least 24 bytes.
+ * Extracts curvature from the nearest points of each query, as surfsig_extract() does.
  *
- * @param points x of the first point; its y and z follow it. May have any alignment; null only if count is 0.
- * @param count Number of points.
- * @param stride Bytes from one point's x to the next one's.
- * @param origin x, y, z that are added to each point, finite; null for 0, 0, 0.
- * @param radius Radius of the ball around each place, in the cloud's unit; finite and above 0.
- * @param options How; null for the default.
+ * @param cloud The points.
+ * @param neighbors How many, the query itself included where it is a point of the cloud; at least 1.
+ * @param options How, and at which queries; null for the default.
  * @param extraction Where the result is put; null is put there where the call fails.
  */
-surfsig_code surfsig_extract_f64(const double *points,
-                                 size_t count,
-                                 size_t stride,
-                                 const double *origin,
-                                 double radius,
-                                 const surfsig_options *options,
-                                 surfsig_extraction **extraction);
+surfsig_code surfsig_extract_nearest(const surfsig_cloud *cloud,
+                                     uint32_t neighbors,
+                                     const surfsig_options *options,
+                                     surfsig_extraction **extraction);
+
+/**
+ * Extracts curvature from balls whose radius each query chooses, as surfsig_extract() does: of the radii 2^(i/2), in
+ * the cloud's unit, the largest that the fit still explains. In the surface's axes only.
+ *
+ * @param cloud The points.
+ * @param options How, and at which queries; null for the default.
+ * @param extraction Where the result is put; null is put there where the call fails.
+ */
+surfsig_code surfsig_extract_auto_radius(const surfsig_cloud *cloud,
+                                         const surfsig_options *options,
+                                         surfsig_extraction **extraction);
+
+/**
+ * Extracts curvature from balls of several radii, in one pass over the points. Values differ from those of
+ * surfsig_extract() with one radius by rounding only.
+ *
+ * @param cloud The points.
+ * @param radii Radii of the balls, (count), in the cloud's unit; each finite and above 0.
+ * @param count How many; 0 does nothing.
+ * @param options How, and at which queries; null for the default.
+ * @param extractions Where the results are put, (count), one for each radius in their order, each to be freed; null
+ * is put there where the call fails.
+ */
+surfsig_code surfsig_extract_radii(const surfsig_cloud *cloud,
+                                   const double *radii,
+                                   size_t count,
+                                   const surfsig_options *options,
+                                   surfsig_extraction **extractions);
 
 /**
  * Frees an extraction and its columns; does nothing with null.
@@ -185,9 +485,564 @@ surfsig_code surfsig_extract_f64(const double *points,
 void surfsig_extraction_free(surfsig_extraction *extraction);
 
 /**
- * Number of places, which is the length of each column; 0 for null.
+ * Number of queries, which is the length of each column; 0 for null.
  */
 size_t surfsig_extraction_size(const surfsig_extraction *extraction);
+
+/**
+ * Radius of the balls; of nearest neighbours and of radii that queries chose, of the largest ball that was looked
+ * through. NaN for null.
+ */
+double surfsig_extraction_radius(const surfsig_extraction *extraction);
+
+/**
+ * 1 where a viewpoint or normals say on which side the sensor was; 0 where the side of each normal, and with it the
+ * sign of curvature, is a convention, and for null.
+ */
+int surfsig_extraction_oriented(const surfsig_extraction *extraction);
+
+/**
+ * The name of a surfsig_surface_kind, such as "cylinder"; null for a number that is none. Never to be freed.
+ */
+const char *surfsig_surface_kind_name(uint8_t kind);
+
+/**
+ * Number of a surface's parameters, 3 to 7, which its covariance has rows and columns; 0 for a number that is no
+ * surfsig_surface_kind.
+ *
+ * In the order of the covariance: a plane's offset along its normal and the normal's tilts; a sphere's centre and
+ * radius; of all others the offsets of the point, the tilts of the axis, and then the radius (cylinder), the radius
+ * and the half angle (cone), the offset along the axis, the major radius and the tube's radius (torus). Offsets and
+ * tilts are along the two directions across the axis.
+ */
+size_t surfsig_surface_kind_parameters(uint8_t kind);
+
+/**
+ * Sums x^i y^j z^k with i + j + k <= 4 over points, from which surfaces are read off. The moments of two sets of
+ * points about one centre add, number by number. Points that are not finite are left out.
+ *
+ * @param cloud The points.
+ * @param centre x, y, z, finite, that are taken from each point before: near the points, for digits are lost with the
+ * fourth power of its distance over their extent. Null for 0, 0, 0.
+ * @param moments Where the sums are put, SURFSIG_MOMENTS doubles, by order, and within an order as 1, x, y, z are
+ * multiplied out: 1, x, y, z, xx, xy, xz, yy, yz, zz, xxx, ...
+ */
+surfsig_code surfsig_moments(const surfsig_cloud *cloud,
+                             const double *centre,
+                             double *moments);
+
+/**
+ * Fits a sphere with Taubin's normalisation: exact on points of a sphere, and hardly biased by noise.
+ *
+ * SURFSIG_CODE_UNDETERMINED for fewer than 4 points, for points of a circle, and for a plane.
+ *
+ * @param moments SURFSIG_MOMENTS doubles, about a centre near the points.
+ * @param sphere Where the result is put, in coordinates about that centre.
+ */
+surfsig_code surfsig_fit_sphere(const double *moments, surfsig_sphere *sphere);
+
+/**
+ * Fits a cylinder with Taubin's normalisation: exact on points of a cylinder, and hardly biased by noise.
+ *
+ * SURFSIG_CODE_UNDETERMINED for fewer than 5 points, for points of a plane, and where no axis converges.
+ *
+ * @param moments SURFSIG_MOMENTS doubles, about a centre near the points.
+ * @param cylinder Where the result is put, in coordinates about that centre.
+ */
+surfsig_code surfsig_fit_cylinder(const double *moments, surfsig_cylinder *cylinder);
+
+/**
+ * Fits a general quadric with Taubin's normalisation: exact on points that lie on a quadric.
+ *
+ * SURFSIG_CODE_UNDETERMINED for fewer than 9 points, and where the fit does not converge.
+ *
+ * @param moments SURFSIG_MOMENTS doubles, about a centre near the points.
+ * @param quadric Where the result is put, in coordinates about that centre.
+ */
+surfsig_code surfsig_fit_quadric(const double *moments, surfsig_quadric *quadric);
+
+/**
+ * Says what a quadric's surface is where it is nearest to a position.
+ *
+ * SURFSIG_CODE_UNDETERMINED where no point of the surface is the nearest, as from a sphere's centre.
+ *
+ * @param quadric The quadric, with an extent above 0.
+ * @param from x, y, z of the position, finite.
+ * @param point Where the result is put.
+ */
+surfsig_code surfsig_quadric_nearest(const surfsig_quadric *quadric,
+                                     const double *from,
+                                     surfsig_surface_point *point);
+
+/**
+ * Makes options of the default values: paraboloids in the surface's axes, no viewpoint, all cores, every point.
+ */
+surfsig_options *surfsig_options_new(void);
+
+/**
+ * Frees options; does nothing with null.
+ */
+void surfsig_options_free(surfsig_options *options);
+
+/**
+ * Chooses the axes in which the paraboloids are fitted.
+ *
+ * @param options The options to change.
+ * @param axes A surfsig_axes; any other number is SURFSIG_CODE_INVALID_INPUT.
+ */
+surfsig_code surfsig_options_set_axes(surfsig_options *options, int axes);
+
+/**
+ * Chooses which surface is fitted; only paraboloids in the sensor's axes.
+ *
+ * @param options The options to change.
+ * @param fit A surfsig_fit; any other number is SURFSIG_CODE_INVALID_INPUT.
+ */
+surfsig_code surfsig_options_set_fit(surfsig_options *options, int fit);
+
+/**
+ * Says where the sensor stood; normals then point to it, and a bump seen from there has a positive
+ * curvature. Without a viewpoint the side of each normal is a convention: its z is positive (in the
+ * sensor's axes negative).
+ *
+ * @param options The options to change.
+ * @param viewpoint x, y, z in the cloud's coordinates, finite; null for none.
+ */
+surfsig_code surfsig_options_set_viewpoint(surfsig_options *options, const double *viewpoint);
+
+/**
+ * Gives normals that are known, in place of a viewpoint: they choose the side of the fitted normals and nothing
+ * else. Their length does not matter; one that is zero or not finite says nothing.
+ *
+ * @param options The options to change.
+ * @param normals x, y, z of each normal, (count, 3), packed; they are copied. Null for none.
+ * @param count How many they are: one for each point of the cloud, or for each position where positions are asked
+ * for; another number is an error of the extraction.
+ */
+surfsig_code surfsig_options_set_normals(surfsig_options *options,
+                                         const float *normals,
+                                         size_t count);
+
+/**
+ * Chooses the number of threads. The result is the same, bit for bit.
+ *
+ * @param options The options to change.
+ * @param threads 1 to 1024; 0 for all cores.
+ */
+surfsig_code surfsig_options_set_threads(surfsig_options *options, uint32_t threads);
+
+/**
+ * Counts only the nearest of the points within the radius of surfsig_extract(); an error of the other extractions.
+ *
+ * @param options The options to change.
+ * @param neighbors At most this many, the query itself included; 0 for all of them.
+ */
+surfsig_code surfsig_options_set_neighbors(surfsig_options *options,
+                                           uint32_t neighbors);
+
+/**
+ * Leaves out points farther from the fitted surface than three standard deviations of the others, and
+ * fits again, until none is left out or comes back; the count is then that of the points that stay.
+ *
+ * @param options The options to change.
+ * @param robust 1 to do so, 0 (the default) not to.
+ */
+surfsig_code surfsig_options_set_robust(surfsig_options *options, int robust);
+
+/**
+ * Asks for curvature at every point of the cloud, as new options do.
+ */
+surfsig_code surfsig_options_set_all(surfsig_options *options);
+
+/**
+ * Asks for curvature at some points; the others are neighbours only. An index that the cloud does not have is an
+ * error of the extraction.
+ *
+ * @param options The options to change.
+ * @param indices Numbers of points, from 0; they are copied. Null only if count is 0.
+ * @param count How many they are; 0 asks for no point at all.
+ */
+surfsig_code surfsig_options_set_indices(surfsig_options *options,
+                                         const uint32_t *indices,
+                                         size_t count);
+
+/**
+ * Asks for curvature at positions that need not be points of the cloud.
+ *
+ * @param options The options to change.
+ * @param positions x, y, z of each in the cloud's coordinates, (count, 3), packed; they are copied. Null only if
+ * count is 0.
+ * @param count How many they are.
+ */
+surfsig_code surfsig_options_set_positions(surfsig_options *options,
+                                           const double *positions,
+                                           size_t count);
+
+/**
+ * Asks for curvature at one point of each voxel that holds any, the one nearest to the mean of the voxel's points;
+ * surfsig_extraction_indices() says which they are.
+ *
+ * @param options The options to change.
+ * @param voxel Edge of the voxels, in the cloud's unit; finite and above 0.
+ */
+surfsig_code surfsig_options_set_voxel(surfsig_options *options,
+                                       double voxel);
+
+/**
+ * Chooses a function that is told the progress, and may stop the extraction.
+ *
+ * @param options The options to change.
+ * @param progress Called with the number of queries that are done and of all, each counted once for each radius;
+ * null for none.
+ * @param data Given to it; must live as long as the options are used.
+ */
+surfsig_code surfsig_options_set_progress(surfsig_options *options,
+                                          surfsig_progress progress,
+                                          void *data);
+
+/**
+ * Fits a surface to points: the sum of squared orthogonal distances is least.
+ *
+ * SURFSIG_CODE_UNDETERMINED where the points are no more than the surface's parameters, do not determine all of them
+ * (those of a circle no sphere), or are not all finite.
+ *
+ * @param cloud The points.
+ * @param kind A surfsig_surface_kind; any other number is SURFSIG_CODE_INVALID_INPUT.
+ * @param start A surface of the same kind near the points, from which the fit begins; null to begin from what the
+ * points tell.
+ * @param primitive Where the result is put; null is put there where the call fails.
+ */
+surfsig_code surfsig_fit_primitive(const surfsig_cloud *cloud,
+                                   uint8_t kind,
+                                   const surfsig_primitive *start,
+                                   surfsig_primitive **primitive);
+
+/**
+ * Frees a surface; does nothing with null.
+ */
+void surfsig_primitive_free(surfsig_primitive *primitive);
+
+/**
+ * What it is; SURFSIG_SURFACE_KIND_PLANE for null.
+ */
+surfsig_surface_kind surfsig_primitive_kind(const surfsig_primitive *primitive);
+
+/**
+ * On the plane or the axis, next to the mean of the points; the centre of a sphere or torus: 3 doubles, which live as
+ * long as the surface; null for null.
+ */
+const double *surfsig_primitive_point(const surfsig_primitive *primitive);
+
+/**
+ * Unit vector, 3 doubles: a plane's normal, the axis of all others; with a positive z (else y, else x), but along a
+ * cone its radius grows. NaN for a sphere; null for null.
+ */
+const double *surfsig_primitive_axis(const surfsig_primitive *primitive);
+
+/**
+ * Of a sphere or cylinder; of a cone at its point; of a torus's tube; NaN for a plane and for null.
+ */
+double surfsig_primitive_radius(const surfsig_primitive *primitive);
+
+/**
+ * Of a torus, from the axis to the middle of the tube; NaN for others and for null.
+ */
+double surfsig_primitive_major_radius(const surfsig_primitive *primitive);
+
+/**
+ * Half the angle at a cone's apex, in radians; NaN for others and for null.
+ */
+double surfsig_primitive_half_angle(const surfsig_primitive *primitive);
+
+/**
+ * Measures how far points are from a surface.
+ *
+ * @param primitive The surface.
+ * @param cloud The points.
+ * @param distances Where the signed distances are put, (surfsig_cloud_size()) doubles: positive outside, or where a
+ * plane's normal points; NaN for points that are not finite.
+ */
+surfsig_code surfsig_primitive_distances(const surfsig_primitive *primitive,
+                                         const surfsig_cloud *cloud,
+                                         double *distances);
+
+/**
+ * Says how sure a surface's parameters are, from blocks of neighbouring points, for those of a scanner err alike.
+ *
+ * @param primitive The surface.
+ * @param cloud The points that it was fitted to.
+ * @param covariance Where the covariance is put, row by row: (p, p) doubles, with p and the parameters as
+ * surfsig_surface_kind_parameters() says, so that 49 are enough for all; NaN where one block of the points is all that
+ * determines some.
+ * @param across Where two unit vectors across the axis are put, (2, 3) doubles; null if nobody asks.
+ * @param freedom Where the degrees of freedom of the radius's variance (a plane's: of the offset's) are put, for
+ * Student's t; null if nobody asks.
+ */
+surfsig_code surfsig_primitive_uncertainty(const surfsig_primitive *primitive,
+                                           const surfsig_cloud *cloud,
+                                           double *covariance,
+                                           double *across,
+                                           double *freedom);
+
+/**
+ * The standard error of a surface's radius (of a plane's offset) that the points' number promises if none err alike;
+ * NaN where they do not determine the surface, and for null.
+ *
+ * @param primitive The surface.
+ * @param cloud The points that it was fitted to.
+ */
+double surfsig_primitive_independent_error(const surfsig_primitive *primitive,
+                                           const surfsig_cloud *cloud);
+
+/**
+ * Makes the signatures of chosen queries, in the default frame. The first call of a process also makes the
+ * frame, in some tens of milliseconds.
+ *
+ * @param extraction Where the queries' surfaces are.
+ * @param queries Numbers of queries, from 0, (count); null for the first count of them.
+ * @param count How many; 0 does nothing.
+ * @param signatures Where they are put: (count, 242) floats, row by row; NaN where there is none.
+ * @param statuses Where it is put why, (count); null if nobody asks.
+ */
+surfsig_code surfsig_signatures(const surfsig_extraction *extraction,
+                                const uint32_t *queries,
+                                size_t count,
+                                float *signatures,
+                                surfsig_status *statuses);
+
+/**
+ * zeta of eq. (12): how alike the surfaces of two signatures are, from 0 to 1; 0.9 and above is optimal, 0.5
+ * and above good. NaN where a signature is missing, zero, or null.
+ *
+ * Both must have been made at the same radius, in the same axes. Where an extraction knew no viewpoint, it
+ * may have seen the surface from its other side, from where the signature is another one.
+ *
+ * @param a 242 floats.
+ * @param b 242 floats.
+ */
+double surfsig_similarity(const float *a, const float *b);
+
+/**
+ * The name of a surfsig_status, such as "too_few_points"; null for a number that is none. Never to be freed.
+ */
+const char *surfsig_status_name(uint8_t status);
+
+/**
+ * Makes options of the default values: all kinds, noise estimated around each point, all cores.
+ */
+surfsig_surface_options *surfsig_surface_options_new(void);
+
+/**
+ * Frees options; does nothing with null.
+ */
+void surfsig_surface_options_free(surfsig_surface_options *options);
+
+/**
+ * Chooses the fewest points of a surface.
+ *
+ * @param options The options to change.
+ * @param points At least 1; 0 for the default: a five-hundredth of all, from 20 to 1,000.
+ */
+surfsig_code surfsig_surface_options_set_min_points(surfsig_surface_options *options, uint32_t points);
+
+/**
+ * Says how far points are from their surfaces.
+ *
+ * @param options The options to change.
+ * @param noise Standard deviation of the distances, in the cloud's unit, finite; 0 to have it estimated around each
+ * point.
+ */
+surfsig_code surfsig_surface_options_set_noise(surfsig_surface_options *options,
+                                               double noise);
+
+/**
+ * Chooses which kinds of surfaces are looked for.
+ *
+ * @param options The options to change.
+ * @param kinds Each a surfsig_surface_kind; any other number is SURFSIG_CODE_INVALID_INPUT. Null only if count is 0.
+ * @param count How many they are; 0 for all kinds.
+ */
+surfsig_code surfsig_surface_options_set_kinds(surfsig_surface_options *options,
+                                               const uint8_t *kinds,
+                                               size_t count);
+
+/**
+ * Chooses the number of threads. The result is the same, bit for bit.
+ *
+ * @param options The options to change.
+ * @param threads 1 to 1024; 0 for all cores.
+ */
+surfsig_code surfsig_surface_options_set_threads(surfsig_surface_options *options, uint32_t threads);
+
+/**
+ * Chooses a function that is told the progress, and may stop the search.
+ *
+ * @param options The options to change.
+ * @param progress Called with the number of points that have a surface, and of all; null for none.
+ * @param data Given to it; must live as long as the options are used.
+ */
+surfsig_code surfsig_surface_options_set_progress(surfsig_surface_options *options,
+                                                  surfsig_progress progress,
+                                                  void *data);
+
+/**
+ * Finds the planes, spheres, cylinders, cones and tori of a scan.
+ *
+ * Surfaces grow from the smoothest points on, over neighbouring points that are within the noise around them; the
+ * simplest kind that explains its points wins. The result is always the same.
+ *
+ * @param cloud The points.
+ * @param options How; null for the default.
+ * @param surfaces Where the result is put; null is put there where the call fails.
+ */
+surfsig_code surfsig_find_surfaces(const surfsig_cloud *cloud,
+                                   const surfsig_surface_options *options,
+                                   surfsig_surfaces **surfaces);
+
+/**
+ * Frees surfaces and their columns; does nothing with null.
+ */
+void surfsig_surfaces_free(surfsig_surfaces *surfaces);
+
+/**
+ * Number of surfaces, which is the length of each column; 0 for null.
+ */
+size_t surfsig_surfaces_size(const surfsig_surfaces *surfaces);
+
+/**
+ * Number of points of the cloud, which is the length of the labels; 0 for null.
+ */
+size_t surfsig_surfaces_label_count(const surfsig_surfaces *surfaces);
+
+/**
+ * Of each point of the cloud the number of its surface, or -1, (label count) numbers; null where there is no point.
+ */
+const int32_t *surfsig_surfaces_labels(const surfsig_surfaces *surfaces);
+
+/**
+ * Covariance of a surface's parameters, row by row: (p, p) doubles, with p and the parameters as
+ * surfsig_surface_kind_parameters() says. Null where the points do not determine it, and for a surface that is none.
+ *
+ * @param surfaces The surfaces.
+ * @param index Number of a surface, from 0.
+ */
+const double *surfsig_surfaces_covariance(const surfsig_surfaces *surfaces,
+                                          size_t index);
+
+/**
+ * The transform that leaves everything where it is.
+ */
+surfsig_transform surfsig_transform_identity(void);
+
+/**
+ * Checks a matrix. R^T R may differ from 1 by 1e-4 in each entry, as that of a printed matrix does: then the nearest
+ * rotation is taken. A rotation that is exact within 1e-12 keeps its bits. Every function that takes a transform does
+ * the same.
+ *
+ * @param matrix 16 doubles, row by row, finite, with 0, 0, 0, 1 in the last row; must neither scale, shear nor mirror.
+ * @param transform Where the result is put; may be where the matrix is.
+ */
+surfsig_code surfsig_transform_from_matrix(const double *matrix,
+                                           surfsig_transform *transform);
+
+/**
+ * Makes a rotation about an axis through 0, and then a translation.
+ *
+ * @param rotation_vector Along the axis, as long as the angle in radians: 3 doubles, finite; null for none.
+ * @param translation 3 doubles, finite; null for none.
+ * @param transform Where the result is put.
+ */
+surfsig_code surfsig_transform_from_rotation_vector(const double *rotation_vector,
+                                                    const double *translation,
+                                                    surfsig_transform *transform);
+
+/**
+ * Makes the transform of a twist: what a motion at this constant velocity, in axes that stay, has made after one unit
+ * of time.
+ *
+ * @param twist A rotation vector in radians, and a translation: 6 doubles, finite.
+ * @param transform Where the result is put.
+ */
+surfsig_code surfsig_transform_exp(const double *twist,
+                                   surfsig_transform *transform);
+
+/**
+ * Gives the twist whose exponential a transform is, with a rotation of pi at most; at pi one of the two.
+ *
+ * @param transform The transform.
+ * @param twist Where the rotation vector in radians and the translation are put: 6 doubles.
+ */
+surfsig_code surfsig_transform_log(const surfsig_transform *transform, double *twist);
+
+/**
+ * Gives the matrix that takes twists in the source's axes to the same motions in the target's:
+ * T exp(twist) T^-1 = exp(Ad twist).
+ *
+ * @param transform The transform.
+ * @param adjoint Where the matrix is put, 6 x 6 doubles, row by row.
+ */
+surfsig_code surfsig_transform_adjoint(const surfsig_transform *transform, double *adjoint);
+
+/**
+ * Multiplies transforms: T_a_b T_b_c = T_a_c, which applies the second one first.
+ *
+ * @param a_b The transform that is applied last.
+ * @param b_c The transform that is applied first.
+ * @param a_c Where the product is put; may be one of the two.
+ */
+surfsig_code surfsig_transform_compose(const surfsig_transform *a_b,
+                                       const surfsig_transform *b_c,
+                                       surfsig_transform *a_c);
+
+/**
+ * Inverts a transform: T_target_source becomes T_source_target.
+ *
+ * @param transform The transform.
+ * @param inverse Where the result is put; may be the transform itself.
+ */
+surfsig_code surfsig_transform_inverse(const surfsig_transform *transform, surfsig_transform *inverse);
+
+/**
+ * Applies a transform to points: R p + t.
+ *
+ * @param transform The transform.
+ * @param points x of the first point; its y and z follow it. May have any alignment; null only if count is 0.
+ * @param count Number of points.
+ * @param stride Bytes from one point's x to the next one's, at least 24.
+ * @param moved Where the results are put, (count, 3) doubles, packed; may be the points themselves where these are
+ * packed.
+ */
+surfsig_code surfsig_transform_points(const surfsig_transform *transform,
+                                      const double *points,
+                                      size_t count,
+                                      size_t stride,
+                                      double *moved);
+
+/**
+ * Applies a transform to vectors, such as normals: R v, without the translation.
+ *
+ * @param transform The transform.
+ * @param vectors x of the first vector; its y and z follow it. May have any alignment; null only if count is 0.
+ * @param count Number of vectors.
+ * @param stride Bytes from one vector's x to the next one's, at least 24.
+ * @param rotated Where the results are put, (count, 3) doubles, packed; may be the vectors themselves where these are
+ * packed.
+ */
+surfsig_code surfsig_transform_vectors(const surfsig_transform *transform,
+                                       const double *vectors,
+                                       size_t count,
+                                       size_t stride,
+                                       double *rotated);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* SURFSIG_H */
+
+#ifdef __cplusplus
+extern "C" {
+#endif  // __cplusplus
 
 /**
  * Larger principal curvature by value, (size) floats per unit of length; a bump seen from the sensor is
@@ -211,7 +1066,7 @@ const float *surfsig_extraction_normals(const surfsig_extraction *extraction);
 const float *surfsig_extraction_directions(const surfsig_extraction *extraction);
 
 /**
- * Root mean square of the points' heights above the fit, (size) floats.
+ * Root mean square of the points' distances from the fit along its height, (size) floats.
  */
 const float *surfsig_extraction_residual(const surfsig_extraction *extraction);
 
@@ -238,12 +1093,12 @@ const float *surfsig_extraction_k1_std(const surfsig_extraction *extraction);
 const float *surfsig_extraction_k2_std(const surfsig_extraction *extraction);
 
 /**
- * Points in the ball, the place itself included, (size) numbers.
+ * Points in the ball, the query itself included where it is one of them, (size) numbers.
  */
 const uint32_t *surfsig_extraction_count(const surfsig_extraction *extraction);
 
 /**
- * What became of each place, (size) bytes.
+ * What became of each query, (size) bytes.
  */
 const surfsig_status *surfsig_extraction_status(const surfsig_extraction *extraction);
 
@@ -263,103 +1118,138 @@ const float *surfsig_extraction_planarity(const surfsig_extraction *extraction);
 const float *surfsig_extraction_scattering(const surfsig_extraction *extraction);
 
 /**
- * Makes options of the default values: the surface's axes, no viewpoint, all cores, every point.
+ * Radius of each query's neighbourhood, (size) floats: of nearest neighbours the distance to the farthest, or
+ * the radius that the query chose. Null where all have the same, surfsig_extraction_radius().
  */
-surfsig_options *surfsig_options_new(void);
+const float *surfsig_extraction_radii(const surfsig_extraction *extraction);
 
 /**
- * Frees options; does nothing with null.
+ * Whose curvature each query has, (size) bytes. Null where only paraboloids were fitted.
  */
-void surfsig_options_free(surfsig_options *options);
+const surfsig_fit_used *surfsig_extraction_fit_used(const surfsig_extraction *extraction);
 
 /**
- * Chooses the axes in which the paraboloids are fitted.
- *
- * @param options The options to change.
- * @param axes A surfsig_axes; any other number is SURFSIG_CODE_INVALID_INPUT.
+ * a, b, c, d, e, f of eq. (5) about each query, (size, 6) floats, row by row, with heights that grow away from
+ * the sensor. Null in the surface's axes.
  */
-surfsig_code surfsig_options_set_axes(surfsig_options *options, int axes);
+const float *surfsig_extraction_coefficients(const surfsig_extraction *extraction);
 
 /**
- * Says where the sensor stood; normals then point to it, and a bump seen from there has a positive
- * curvature. Without a viewpoint the side of each normal is a convention: its z is positive (in the
- * sensor's axes negative).
- *
- * @param options The options to change.
- * @param viewpoint x, y, z in the cloud's coordinates, finite; null for none.
+ * Numbers of the queries in the cloud, (size). Null where the queries are all points in their order, or
+ * positions.
  */
-surfsig_code surfsig_options_set_viewpoint(surfsig_options *options, const double *viewpoint);
+const uint32_t *surfsig_extraction_indices(const surfsig_extraction *extraction);
 
 /**
- * Chooses the number of threads. The result is the same, bit for bit.
- *
- * @param options The options to change.
- * @param threads 1 to 1024; 0 for all cores.
+ * X(type, name, width) for each column of a surfsig_extraction: surfsig_extraction_##name() gives it, width values a
+ * row.
  */
-surfsig_code surfsig_options_set_threads(surfsig_options *options, uint32_t threads);
+#define SURFSIG_EXTRACTION_COLUMNS(X) \
+  X(float, k1, 1) \
+  X(float, k2, 1) \
+  X(float, normals, 3) \
+  X(float, directions, 3) \
+  X(float, residual, 1) \
+  X(float, condition, 1) \
+  X(float, mean_curvature_std, 1) \
+  X(float, k1_std, 1) \
+  X(float, k2_std, 1) \
+  X(uint32_t, count, 1) \
+  X(surfsig_status, status, 1) \
+  X(float, linearity, 1) \
+  X(float, planarity, 1) \
+  X(float, scattering, 1) \
+  X(float, radii, 1) \
+  X(surfsig_fit_used, fit_used, 1) \
+  X(float, coefficients, 6) \
+  X(uint32_t, indices, 1)
 
 /**
- * Counts only the nearest of the points within the radius.
- *
- * @param options The options to change.
- * @param neighbors At most this many, the place itself included; 0 for all of them.
+ * What each surface is, (size) bytes. Like every column it lives as long as the surfaces; null where there are
+ * none.
  */
-surfsig_code surfsig_options_set_neighbors(surfsig_options *options, uint32_t neighbors);
+const surfsig_surface_kind *surfsig_surfaces_kind(const surfsig_surfaces *surfaces);
 
 /**
- * Leaves out points farther from the fitted surface than three standard deviations of the others, and
- * fits again, until the choice stands; the count is then that of the points that stay.
- *
- * @param options The options to change.
- * @param robust 1 to do so, 0 (the default) not to.
+ * On the plane or the axis, near the points; the centre of a sphere or torus: (size, 3) doubles, row by row.
  */
-surfsig_code surfsig_options_set_robust(surfsig_options *options, int robust);
+const double *surfsig_surfaces_point(const surfsig_surfaces *surfaces);
 
 /**
- * Chooses the points at which curvature is asked for; the others are neighbours only. An index that the
- * cloud does not have is an error of the extraction.
- *
- * @param options The options to change.
- * @param indices Numbers of points, from 0; they are copied. Null only if count is 0.
- * @param count How many they are; 0 asks for no place at all.
+ * Unit vectors: a plane's normal, the axis of all others, along which a cone widens, (size, 3) doubles; NaN for a
+ * sphere.
  */
-surfsig_code surfsig_options_set_indices(surfsig_options *options, const uint32_t *indices, size_t count);
+const double *surfsig_surfaces_axis(const surfsig_surfaces *surfaces);
 
 /**
- * Makes the signatures of chosen places, in the default frame. The first call of a process also makes the
- * frame, in some tens of milliseconds.
- *
- * @param extraction Where the places' surfaces are.
- * @param places Numbers of places, from 0, (count); null for the first count of them.
- * @param count How many; 0 does nothing.
- * @param signatures Where they are put: (count, 242) floats, row by row; NaN where there is none.
- * @param statuses Where it is put why, (count); null if nobody asks.
+ * Of a sphere or cylinder, of a cone at its point, of a torus's tube, (size) doubles; NaN for a plane.
  */
-surfsig_code surfsig_signatures(const surfsig_extraction *extraction,
-                                const uint32_t *places,
-                                size_t count,
-                                float *signatures,
-                                surfsig_status *statuses);
+const double *surfsig_surfaces_radius(const surfsig_surfaces *surfaces);
 
 /**
- * zeta of eq. (12): how alike the surfaces of two signatures are, from 0 to 1; 0.9 and above is optimal, 0.5
- * and above good. NaN where a signature is missing, zero, or null.
- *
- * Both must have been made at the same radius, in the same axes. Where an extraction knew no viewpoint, it
- * may have seen the surface from its other side, from where the signature is another one.
- *
- * @param a 242 floats.
- * @param b 242 floats.
+ * Of a torus, from its axis to the middle of its tube, (size) doubles; NaN for others.
  */
-double surfsig_similarity(const float *a, const float *b);
+const double *surfsig_surfaces_major_radius(const surfsig_surfaces *surfaces);
 
 /**
- * The name of a surfsig_status, such as "too_few_points"; null for a number that is none. Never to be freed.
+ * Of a cone, between its axis and its side, in radians, (size) doubles; NaN for others.
  */
-const char *surfsig_status_name(uint8_t status);
+const double *surfsig_surfaces_half_angle(const surfsig_surfaces *surfaces);
+
+/**
+ * Standard deviation of a point's distance, (size) doubles.
+ */
+const double *surfsig_surfaces_deviation(const surfsig_surfaces *surfaces);
+
+/**
+ * Number of points, (size) numbers.
+ */
+const uint32_t *surfsig_surfaces_count(const surfsig_surfaces *surfaces);
+
+/**
+ * Standard error of the radius, (size) doubles; NaN where the points do not determine it.
+ */
+const double *surfsig_surfaces_radius_std(const surfsig_surfaces *surfaces);
+
+/**
+ * Standard error of the major radius, (size) doubles.
+ */
+const double *surfsig_surfaces_major_radius_std(const surfsig_surfaces *surfaces);
+
+/**
+ * Standard error of the half angle, (size) doubles.
+ */
+const double *surfsig_surfaces_half_angle_std(const surfsig_surfaces *surfaces);
+
+/**
+ * Two unit vectors across the axis, along which the covariance counts offsets and tilts, (size, 2, 3) doubles.
+ */
+const double *surfsig_surfaces_across(const surfsig_surfaces *surfaces);
+
+/**
+ * Degrees of freedom behind the standard errors, for Student's t, (size) doubles.
+ */
+const double *surfsig_surfaces_freedom(const surfsig_surfaces *surfaces);
+
+/**
+ * X(type, name, width) for each column of a surfsig_surfaces: surfsig_surfaces_##name() gives it, width values a
+ * row.
+ */
+#define SURFSIG_SURFACES_COLUMNS(X) \
+  X(surfsig_surface_kind, kind, 1) \
+  X(double, point, 3) \
+  X(double, axis, 3) \
+  X(double, radius, 1) \
+  X(double, major_radius, 1) \
+  X(double, half_angle, 1) \
+  X(double, deviation, 1) \
+  X(uint32_t, count, 1) \
+  X(double, radius_std, 1) \
+  X(double, major_radius_std, 1) \
+  X(double, half_angle_std, 1) \
+  X(double, across, 6) \
+  X(double, freedom, 1)
 
 #ifdef __cplusplus
 }  // extern "C"
 #endif  // __cplusplus
-
-#endif  /* SURFSIG_H */

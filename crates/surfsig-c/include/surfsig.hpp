@@ -12,13 +12,20 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
+#include <functional>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 namespace surfsig {
 
 using Signature = std::array<float, SURFSIG_SIGNATURE>;
+using Vector = std::array<double, 3>;
+using Twist = std::array<double, 6>;
+/** Told how much is done, and of how much; false stops the work. */
+using Progress = std::function<bool(std::size_t done, std::size_t total)>;
 
 /** What went wrong; what() says it in one line. */
 class Error : public std::runtime_error {
@@ -31,12 +38,79 @@ inline void check(surfsig_code code) {
   if (code != SURFSIG_CODE_OK) throw Error(code);
 }
 
+namespace detail {
+
+/** Frees what C made. */
+template <class T, void (*free)(T *)> struct Free {
+  void operator()(T *object) const { free(object); }
+};
+template <class T, void (*free)(T *)> using Handle = std::unique_ptr<T, Free<T, free>>;
+
+/** A progress function whose exceptions do not pass through C: they are kept, and thrown afterwards. */
+class Watch {
+public:
+  static int call(void *watch, std::size_t done, std::size_t total) noexcept {
+    Watch &self = *static_cast<Watch *>(watch);
+    try {
+      return self.progress(done, total) ? 0 : 1;
+    } catch (...) {
+      self.thrown = std::current_exception();
+      return 1;
+    }
+  }
+  void check(surfsig_code code) {
+    if (thrown) std::rethrow_exception(std::exchange(thrown, nullptr));
+    surfsig::check(code);
+  }
+  Progress progress;
+
+private:
+  std::exception_ptr thrown;
+};
+
+} // namespace detail
+
+/**
+ * Points whose x, y, z stand `stride` bytes apart; `origin`, three numbers, is added to each. Packed points
+ * are used where they are: they must neither change nor go as long as the cloud is used.
+ */
+class Cloud {
+public:
+  Cloud(const float *points, std::size_t count, std::size_t stride, const double *origin = nullptr) {
+    surfsig_cloud *made = nullptr;
+    check(surfsig_cloud_new_f32(points, count, stride, origin, &made));
+    handle_.reset(made);
+  }
+  Cloud(const double *points, std::size_t count, std::size_t stride, const double *origin = nullptr) {
+    surfsig_cloud *made = nullptr;
+    check(surfsig_cloud_new_f64(points, count, stride, origin, &made));
+    handle_.reset(made);
+  }
+  /** A container of points with members x, y, z in a row, such as pcl::PointCloud<pcl::PointXYZ>::points. */
+  template <class Points>
+  explicit Cloud(const Points &points, const double *origin = nullptr)
+      : Cloud(points.size() == 0 ? nullptr : &points.data()->x, points.size(), sizeof(*points.data()),
+              origin) {}
+  std::size_t size() const { return surfsig_cloud_size(get()); }
+  const surfsig_cloud *get() const { return handle_.get(); }
+
+private:
+  detail::Handle<surfsig_cloud, surfsig_cloud_free> handle_;
+};
+
 /** How an extraction is done; by default in the surface's axes, on all cores, at every point. */
 class Options {
 public:
   Options &axes(surfsig_axes axes) { return checked(surfsig_options_set_axes(handle_.get(), axes)); }
-  Options &viewpoint(const std::array<double, 3> &viewpoint) {
+  Options &fit(surfsig_fit fit) { return checked(surfsig_options_set_fit(handle_.get(), fit)); }
+  Options &viewpoint(const Vector &viewpoint) {
     return checked(surfsig_options_set_viewpoint(handle_.get(), viewpoint.data()));
+  }
+  /** Of each point of the cloud, or of each position. */
+  Options &normals(const std::vector<std::array<float, 3>> &normals) {
+    static const float none = 0.0f; // null would mean that no normals are known
+    const float *const first = normals.empty() ? &none : normals.front().data();
+    return checked(surfsig_options_set_normals(handle_.get(), first, normals.size()));
   }
   Options &threads(std::uint32_t threads) {
     return checked(surfsig_options_set_threads(handle_.get(), threads));
@@ -45,26 +119,38 @@ public:
     return checked(surfsig_options_set_neighbors(handle_.get(), most));
   }
   Options &robust(bool robust) { return checked(surfsig_options_set_robust(handle_.get(), robust ? 1 : 0)); }
+  Options &all() { return checked(surfsig_options_set_all(handle_.get())); }
   Options &indices(const std::vector<std::uint32_t> &indices) {
     return checked(surfsig_options_set_indices(handle_.get(), indices.data(), indices.size()));
   }
+  Options &positions(const std::vector<Vector> &positions) {
+    const double *const first = positions.empty() ? nullptr : positions.front().data();
+    return checked(surfsig_options_set_positions(handle_.get(), first, positions.size()));
+  }
+  Options &voxel(double edge) { return checked(surfsig_options_set_voxel(handle_.get(), edge)); }
+  /** Called by the thread that extracts; what it throws stops the extraction and is thrown by that. */
+  Options &progress(Progress progress) {
+    watch_->progress = std::move(progress);
+    const auto call = watch_->progress ? &detail::Watch::call : nullptr;
+    return checked(surfsig_options_set_progress(handle_.get(), call, watch_.get()));
+  }
   const surfsig_options *get() const { return handle_.get(); }
+  /** Throws where a call with these options failed. */
+  void check(surfsig_code code) const { watch_->check(code); }
 
 private:
-  struct Free {
-    void operator()(surfsig_options *options) const { surfsig_options_free(options); }
-  };
   Options &checked(surfsig_code code) {
-    check(code);
+    surfsig::check(code);
     return *this;
   }
-  std::unique_ptr<surfsig_options, Free> handle_{surfsig_options_new()};
+  detail::Handle<surfsig_options, surfsig_options_free> handle_{surfsig_options_new()};
+  std::unique_ptr<detail::Watch> watch_{std::make_unique<detail::Watch>()};
 };
 
-/** A column of an extraction; it lives as long as that. */
+/** A column of a result; it lives as long as that. Empty where the result does not have it. */
 template <class T> class Column {
 public:
-  Column(const T *first, std::size_t size) : first_(first), size_(size) {}
+  Column(const T *first, std::size_t size) : first_(first), size_(first == nullptr ? 0 : size) {}
   const T *data() const { return first_; }
   std::size_t size() const { return size_; }
   const T *begin() const { return first_; }
@@ -76,73 +162,306 @@ private:
   std::size_t size_;
 };
 
-/** Columns of one length; those of vectors hold three numbers for each place, row by row. */
+/**
+ * Columns of one length: k1(), k2(), normals(), ..., one for each function surfsig_extraction_...() of
+ * SURFSIG_EXTRACTION_COLUMNS. Those of vectors hold several numbers for each query, row by row.
+ */
 class Extraction {
 public:
   explicit Extraction(surfsig_extraction *owned) : handle_(owned) {}
   std::size_t size() const { return surfsig_extraction_size(get()); }
-  Column<float> k1() const { return {surfsig_extraction_k1(get()), size()}; }
-  Column<float> k2() const { return {surfsig_extraction_k2(get()), size()}; }
-  Column<float> normals() const { return {surfsig_extraction_normals(get()), 3 * size()}; }
-  Column<float> directions() const { return {surfsig_extraction_directions(get()), 3 * size()}; }
-  Column<float> residual() const { return {surfsig_extraction_residual(get()), size()}; }
-  Column<float> condition() const { return {surfsig_extraction_condition(get()), size()}; }
-  Column<float> mean_curvature_std() const {
-    return {surfsig_extraction_mean_curvature_std(get()), size()};
-  }
-  Column<float> k1_std() const { return {surfsig_extraction_k1_std(get()), size()}; }
-  Column<float> k2_std() const { return {surfsig_extraction_k2_std(get()), size()}; }
-  Column<std::uint32_t> count() const { return {surfsig_extraction_count(get()), size()}; }
-  Column<surfsig_status> status() const { return {surfsig_extraction_status(get()), size()}; }
-  Column<float> linearity() const { return {surfsig_extraction_linearity(get()), size()}; }
-  Column<float> planarity() const { return {surfsig_extraction_planarity(get()), size()}; }
-  Column<float> scattering() const { return {surfsig_extraction_scattering(get()), size()}; }
+  double radius() const { return surfsig_extraction_radius(get()); }
+  bool oriented() const { return surfsig_extraction_oriented(get()) != 0; }
+#define SURFSIG_COLUMN(type, name, width)                                                                  \
+  Column<type> name() const { return {surfsig_extraction_##name(get()), width * size()}; }
+  SURFSIG_EXTRACTION_COLUMNS(SURFSIG_COLUMN)
+#undef SURFSIG_COLUMN
 
-  /** Signatures of places, and, where asked for, why one is missing. */
-  std::vector<Signature> signatures(const std::vector<std::uint32_t> &places,
+  /** Signatures of queries, and, where asked for, why one is missing. */
+  std::vector<Signature> signatures(const std::vector<std::uint32_t> &queries,
                                     std::vector<surfsig_status> *statuses = nullptr) const {
-    std::vector<Signature> rows(places.size());
-    if (statuses != nullptr) statuses->resize(places.size());
-    if (places.empty()) return rows;
+    std::vector<Signature> rows(queries.size());
+    if (statuses != nullptr) statuses->resize(queries.size());
+    if (queries.empty()) return rows;
     surfsig_status *const why = statuses != nullptr ? statuses->data() : nullptr;
-    check(surfsig_signatures(get(), places.data(), places.size(), rows.front().data(), why));
+    check(surfsig_signatures(get(), queries.data(), queries.size(), rows.front().data(), why));
     return rows;
   }
   const surfsig_extraction *get() const { return handle_.get(); }
 
 private:
-  struct Free {
-    void operator()(surfsig_extraction *extraction) const { surfsig_extraction_free(extraction); }
-  };
-  std::unique_ptr<surfsig_extraction, Free> handle_;
+  detail::Handle<surfsig_extraction, surfsig_extraction_free> handle_;
 };
 
-/** Points whose x, y, z stand `stride` bytes apart; `origin`, three numbers, is added to each. */
+/** From the points within a radius of each query. */
+inline Extraction extract(const Cloud &cloud, double radius, const Options &options = Options()) {
+  surfsig_extraction *made = nullptr;
+  options.check(surfsig_extract(cloud.get(), radius, options.get(), &made));
+  return Extraction(made);
+}
+
 inline Extraction extract(const float *points, std::size_t count, std::size_t stride, double radius,
                           const Options &options = Options(), const double *origin = nullptr) {
-  surfsig_extraction *made = nullptr;
-  check(surfsig_extract_f32(points, count, stride, origin, radius, options.get(), &made));
-  return Extraction(made);
+  return extract(Cloud(points, count, stride, origin), radius, options);
 }
 
 inline Extraction extract(const double *points, std::size_t count, std::size_t stride, double radius,
                           const Options &options = Options(), const double *origin = nullptr) {
-  surfsig_extraction *made = nullptr;
-  check(surfsig_extract_f64(points, count, stride, origin, radius, options.get(), &made));
-  return Extraction(made);
+  return extract(Cloud(points, count, stride, origin), radius, options);
 }
 
-/** A container of points with neighbouring members x, y, z, such as pcl::PointCloud<pcl::PointXYZ>::points. */
+/** A container of points with neighbouring members x, y, z. */
 template <class Points>
 Extraction extract(const Points &points, double radius, const Options &options = Options(),
                    const double *origin = nullptr) {
-  const auto *const x = points.size() == 0 ? nullptr : &points.data()->x;
-  return extract(x, points.size(), sizeof(*points.data()), radius, options, origin);
+  return extract(Cloud(points, origin), radius, options);
+}
+
+/** From the nearest points of each query. */
+inline Extraction extract_nearest(const Cloud &cloud, std::uint32_t neighbors,
+                                  const Options &options = Options()) {
+  surfsig_extraction *made = nullptr;
+  options.check(surfsig_extract_nearest(cloud.get(), neighbors, options.get(), &made));
+  return Extraction(made);
+}
+
+/** From balls whose radius each query chooses. */
+inline Extraction extract_auto_radius(const Cloud &cloud, const Options &options = Options()) {
+  surfsig_extraction *made = nullptr;
+  options.check(surfsig_extract_auto_radius(cloud.get(), options.get(), &made));
+  return Extraction(made);
+}
+
+/** From balls of several radii, one extraction for each. */
+inline std::vector<Extraction> extract_radii(const Cloud &cloud, const std::vector<double> &radii,
+                                             const Options &options = Options()) {
+  std::vector<surfsig_extraction *> made(radii.size(), nullptr);
+  options.check(surfsig_extract_radii(cloud.get(), radii.data(), radii.size(), options.get(), made.data()));
+  return std::vector<Extraction>(made.begin(), made.end());
 }
 
 inline double similarity(const Signature &a, const Signature &b) {
   return surfsig_similarity(a.data(), b.data());
 }
+
+/** How surfaces are found; by default all kinds, with noise estimated around each point, on all cores. */
+class SurfaceOptions {
+public:
+  SurfaceOptions &min_points(std::uint32_t points) {
+    return checked(surfsig_surface_options_set_min_points(handle_.get(), points));
+  }
+  SurfaceOptions &noise(double noise) {
+    return checked(surfsig_surface_options_set_noise(handle_.get(), noise));
+  }
+  SurfaceOptions &kinds(const std::vector<surfsig_surface_kind> &kinds) {
+    const std::vector<std::uint8_t> numbers(kinds.begin(), kinds.end());
+    return checked(surfsig_surface_options_set_kinds(handle_.get(), numbers.data(), numbers.size()));
+  }
+  SurfaceOptions &threads(std::uint32_t threads) {
+    return checked(surfsig_surface_options_set_threads(handle_.get(), threads));
+  }
+  /** Called by the thread that searches; what it throws stops the search and is thrown by that. */
+  SurfaceOptions &progress(Progress progress) {
+    watch_->progress = std::move(progress);
+    const auto call = watch_->progress ? &detail::Watch::call : nullptr;
+    return checked(surfsig_surface_options_set_progress(handle_.get(), call, watch_.get()));
+  }
+  const surfsig_surface_options *get() const { return handle_.get(); }
+  /** Throws where a call with these options failed. */
+  void check(surfsig_code code) const { watch_->check(code); }
+
+private:
+  SurfaceOptions &checked(surfsig_code code) {
+    surfsig::check(code);
+    return *this;
+  }
+  detail::Handle<surfsig_surface_options, surfsig_surface_options_free> handle_{
+      surfsig_surface_options_new()};
+  std::unique_ptr<detail::Watch> watch_{std::make_unique<detail::Watch>()};
+};
+
+/**
+ * The surfaces of a scan, the largest first. Columns of one length: kind(), point(), axis(), radius(), ...,
+ * one for each function surfsig_surfaces_...() of SURFSIG_SURFACES_COLUMNS.
+ */
+class Surfaces {
+public:
+  explicit Surfaces(surfsig_surfaces *owned) : handle_(owned) {}
+  std::size_t size() const { return surfsig_surfaces_size(get()); }
+  /** Of each point the number of its surface, or -1. */
+  Column<std::int32_t> labels() const {
+    return {surfsig_surfaces_labels(get()), surfsig_surfaces_label_count(get())};
+  }
+  /** Of a surface's parameters, row by row; empty where the points do not determine it. */
+  Column<double> covariance(std::size_t index) const {
+    const double *const first = surfsig_surfaces_covariance(get(), index);
+    const std::size_t parameters = first == nullptr ? 0 : surfsig_surface_kind_parameters(kind()[index]);
+    return {first, parameters * parameters};
+  }
+#define SURFSIG_COLUMN(type, name, width)                                                                  \
+  Column<type> name() const { return {surfsig_surfaces_##name(get()), width * size()}; }
+  SURFSIG_SURFACES_COLUMNS(SURFSIG_COLUMN)
+#undef SURFSIG_COLUMN
+  const surfsig_surfaces *get() const { return handle_.get(); }
+
+private:
+  detail::Handle<surfsig_surfaces, surfsig_surfaces_free> handle_;
+};
+
+inline Surfaces find_surfaces(const Cloud &cloud, const SurfaceOptions &options = SurfaceOptions()) {
+  surfsig_surfaces *made = nullptr;
+  options.check(surfsig_find_surfaces(cloud.get(), options.get(), &made));
+  return Surfaces(made);
+}
+
+/** How sure a surface's parameters are. */
+struct Uncertainty {
+  /** p x p, row by row, with p and the parameters as surfsig_surface_kind_parameters() says. */
+  std::vector<double> covariance;
+  /** Two unit vectors across the axis. */
+  std::array<Vector, 2> across;
+  /** Degrees of freedom of the radius's variance (a plane's: of the offset's). */
+  double freedom;
+};
+
+/** A plane, sphere, cylinder, cone or torus without a boundary. */
+class Primitive {
+public:
+  explicit Primitive(surfsig_primitive *owned) : handle_(owned) {}
+  surfsig_surface_kind kind() const { return surfsig_primitive_kind(get()); }
+  Vector point() const { return vector(surfsig_primitive_point(get())); }
+  Vector axis() const { return vector(surfsig_primitive_axis(get())); }
+  double radius() const { return surfsig_primitive_radius(get()); }
+  double major_radius() const { return surfsig_primitive_major_radius(get()); }
+  double half_angle() const { return surfsig_primitive_half_angle(get()); }
+  std::vector<double> distances(const Cloud &cloud) const {
+    std::vector<double> distances(cloud.size());
+    check(surfsig_primitive_distances(get(), cloud.get(), distances.data()));
+    return distances;
+  }
+  Uncertainty uncertainty(const Cloud &cloud) const {
+    const std::size_t parameters = surfsig_surface_kind_parameters(kind());
+    Uncertainty found{std::vector<double>(parameters * parameters), {}, 0.0};
+    check(surfsig_primitive_uncertainty(get(), cloud.get(), found.covariance.data(), found.across[0].data(),
+                                        &found.freedom));
+    return found;
+  }
+  double independent_error(const Cloud &cloud) const {
+    return surfsig_primitive_independent_error(get(), cloud.get());
+  }
+  const surfsig_primitive *get() const { return handle_.get(); }
+
+private:
+  static Vector vector(const double *first) { return {{first[0], first[1], first[2]}}; }
+  detail::Handle<surfsig_primitive, surfsig_primitive_free> handle_;
+};
+
+/** By orthogonal distance; from `start` on, if one is given. */
+inline Primitive fit_primitive(const Cloud &cloud, surfsig_surface_kind kind,
+                               const Primitive *start = nullptr) {
+  surfsig_primitive *made = nullptr;
+  check(surfsig_fit_primitive(cloud.get(), kind, start != nullptr ? start->get() : nullptr, &made));
+  return Primitive(made);
+}
+
+/** Sums over points, about a centre near them, off which surfaces are read. Those of two sets add. */
+class Moments {
+public:
+  explicit Moments(const Cloud &cloud, const Vector &centre = {{0.0, 0.0, 0.0}}) {
+    check(surfsig_moments(cloud.get(), centre.data(), sums_.data()));
+  }
+  Moments &operator+=(const Moments &other) {
+    for (std::size_t i = 0; i < sums_.size(); ++i) sums_[i] += other.sums_[i];
+    return *this;
+  }
+  surfsig_sphere sphere() const { return fitted<surfsig_sphere>(surfsig_fit_sphere); }
+  surfsig_cylinder cylinder() const { return fitted<surfsig_cylinder>(surfsig_fit_cylinder); }
+  surfsig_quadric quadric() const { return fitted<surfsig_quadric>(surfsig_fit_quadric); }
+  const double *data() const { return sums_.data(); }
+
+private:
+  template <class T> T fitted(surfsig_code (*fit)(const double *, T *)) const {
+    T found;
+    check(fit(data(), &found));
+    return found;
+  }
+  std::array<double, SURFSIG_MOMENTS> sums_;
+};
+
+/**
+ * A rotation and a translation: a point p of the source is at R p + t of the target. Written T_target_source,
+ * so that T_a_b * T_b_c = T_a_c.
+ *
+ * With Eigen: `Isometry(matrix)` of an Eigen::Matrix<double, 4, 4, Eigen::RowMajor>, and back
+ * `Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(isometry.data())`.
+ */
+class Isometry {
+public:
+  Isometry() : transform_(surfsig_transform_identity()) {}
+  explicit Isometry(const surfsig_transform &transform) : Isometry(transform.matrix) {}
+  /** 16 doubles, row by row; the rotation may be off by 1e-4, as a printed one is. */
+  explicit Isometry(const double *matrix) { check(surfsig_transform_from_matrix(matrix, &transform_)); }
+  /** A row-major matrix of doubles, such as Eigen's. */
+  template <class Matrix, int row_major = Matrix::IsRowMajor>
+  explicit Isometry(const Matrix &matrix) : Isometry(matrix.data()) {
+    static_assert(row_major == 1 && Matrix::SizeAtCompileTime == 16, "a 4 x 4 matrix, row by row");
+  }
+  static Isometry from_rotation_vector(const Vector &rotation, const Vector &translation) {
+    Isometry made;
+    check(surfsig_transform_from_rotation_vector(rotation.data(), translation.data(), &made.transform_));
+    return made;
+  }
+  static Isometry exp(const Twist &twist) {
+    Isometry made;
+    check(surfsig_transform_exp(twist.data(), &made.transform_));
+    return made;
+  }
+  Twist log() const {
+    Twist twist;
+    check(surfsig_transform_log(&transform_, twist.data()));
+    return twist;
+  }
+  /** 6 x 6, row by row. */
+  std::array<double, 36> adjoint() const {
+    std::array<double, 36> matrix;
+    check(surfsig_transform_adjoint(&transform_, matrix.data()));
+    return matrix;
+  }
+  Isometry inverse() const {
+    Isometry made;
+    check(surfsig_transform_inverse(&transform_, &made.transform_));
+    return made;
+  }
+  Isometry operator*(const Isometry &first) const {
+    Isometry made;
+    check(surfsig_transform_compose(&transform_, &first.transform_, &made.transform_));
+    return made;
+  }
+  /** Where a point is in the target. */
+  Vector transform_point(const Vector &point) const {
+    Vector moved;
+    check(surfsig_transform_points(&transform_, point.data(), 1, sizeof point, moved.data()));
+    return moved;
+  }
+  std::vector<Vector> transform_points(const std::vector<Vector> &points) const {
+    std::vector<Vector> moved(points.size());
+    if (points.empty()) return moved;
+    check(surfsig_transform_points(&transform_, points.front().data(), points.size(), sizeof(Vector),
+                                   moved.front().data()));
+    return moved;
+  }
+  /** What a vector, such as a normal, is in the target: not translated. */
+  Vector transform_vector(const Vector &vector) const {
+    Vector rotated;
+    check(surfsig_transform_vectors(&transform_, vector.data(), 1, sizeof vector, rotated.data()));
+    return rotated;
+  }
+  const double *data() const { return transform_.matrix; }
+  const surfsig_transform &get() const { return transform_; }
+
+private:
+  surfsig_transform transform_;
+};
 
 } // namespace surfsig
 

@@ -4,6 +4,9 @@ use crate::code::Failure;
 use std::borrow::Cow;
 use std::mem::size_of;
 
+/// Most entries of an array: points are numbered by 32 bits, and what is longer is a mistake.
+const MOST_ENTRIES: usize = u32::MAX as usize;
+
 /// An array of the caller's.
 ///
 /// # Safety
@@ -59,7 +62,69 @@ pub unsafe fn points<'a, T: Copy>(
     // SAFETY: each point is valid by this function's condition; the bytes of a message may have any
     // alignment.
     let point = |i: usize| unsafe { first.byte_add(i * stride).read_unaligned() };
-    Ok(Cow::Owned((0..count).map(point).collect()))
+    let mut copy = Vec::new();
+    let refused = |_| Failure::system(format!("no memory for a copy of {count} points"));
+    copy.try_reserve_exact(count).map_err(refused)?;
+    copy.extend((0..count).map(point));
+    Ok(Cow::Owned(copy))
+}
+
+/// Where a result is put.
+///
+/// # Safety
+/// `result` is null or points to where a value can be written.
+pub unsafe fn put<T>(result: *mut T, value: T, name: &str) -> Result<(), Failure> {
+    if result.is_null() {
+        return Err(Failure::invalid_input(format!("{name} must not be null")));
+    }
+    // SAFETY: not null, and the caller's to be written; what stood there may have had no value.
+    unsafe { result.write_unaligned(value) };
+    Ok(())
+}
+
+/// Where a new object is put: null until the work that makes it has succeeded.
+///
+/// # Safety
+/// `result` is null or points to where a pointer can be written.
+pub unsafe fn put_new<T>(
+    result: *mut *mut T,
+    name: &str,
+    work: impl FnOnce() -> Result<T, Failure>,
+) -> Result<(), Failure> {
+    // SAFETY: the condition is the same.
+    unsafe { put(result, std::ptr::null_mut(), name) }?;
+    let made = Box::new(work()?);
+    // SAFETY: the condition is the same.
+    unsafe { put(result, Box::into_raw(made), name) }
+}
+
+/// Numbers of a fixed count, such as x, y, z; `None` for null.
+///
+/// # Safety
+/// `first` is null or points to `N` numbers, of any alignment.
+pub unsafe fn numbers<const N: usize>(first: *const f64) -> Option<[f64; N]> {
+    // SAFETY: not null, and valid by this function's condition.
+    (!first.is_null()).then(|| unsafe { first.cast::<[f64; N]>().read_unaligned() })
+}
+
+/// A point in the cloud's coordinates, `None` for null.
+///
+/// # Safety
+/// `position` is null or points to three numbers.
+pub unsafe fn position(position: *const f64, name: &str) -> Result<Option<[f64; 3]>, Failure> {
+    // SAFETY: the condition is the same.
+    let position = unsafe { numbers(position) };
+    match position {
+        Some(p) if !p.iter().all(|c| c.is_finite()) => {
+            Err(Failure::invalid_input(format!("{name} must be finite, not {p:?}")))
+        }
+        _ => Ok(position),
+    }
+}
+
+/// What must not be null.
+pub fn present<T>(object: Option<T>, name: &str) -> Result<T, Failure> {
+    object.ok_or_else(|| Failure::invalid_input(format!("{name} must not be null")))
 }
 
 /// Refuses what cannot be the first of an array.
@@ -69,6 +134,10 @@ fn check<T>(first: *const T, count: usize, stride: usize, name: &str) -> Result<
     }
     if count.checked_mul(stride).is_none_or(|size| size > isize::MAX as usize) {
         let message = format!("{name}: {count} entries of {stride} bytes are more than memory can hold");
+        return Err(Failure::invalid_input(message));
+    }
+    if count > MOST_ENTRIES {
+        let message = format!("{name}: {count} entries are too many: at most {MOST_ENTRIES} are numbered");
         return Err(Failure::invalid_input(message));
     }
     Ok(())

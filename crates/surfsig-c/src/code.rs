@@ -13,15 +13,19 @@ pub enum surfsig_code {
     Ok = 0,
     /// An argument has no meaning: a mistake that the caller can mend.
     InvalidInput = 1,
-    /// The operating system refused the threads.
+    /// The operating system refused threads or memory.
     System = 2,
     /// A bug in surfsig: please report it with the text of surfsig_last_error().
     Internal = 3,
+    /// The points do not determine what was to be fitted: they are too few, or lie on a curve.
+    Undetermined = 4,
+    /// The progress function asked to stop.
+    Cancelled = 5,
 }
 
 /// Why a call failed.
 #[derive(Debug)]
-pub struct Failure {
+pub(crate) struct Failure {
     code: surfsig_code,
     message: String,
 }
@@ -31,7 +35,15 @@ impl Failure {
         Self { code: surfsig_code::InvalidInput, message: message.into() }
     }
 
-    fn panicked(payload: &(dyn Any + Send)) -> Self {
+    pub fn system(message: impl Into<String>) -> Self {
+        Self { code: surfsig_code::System, message: message.into() }
+    }
+
+    pub fn undetermined(what: &str) -> Self {
+        Self { code: surfsig_code::Undetermined, message: format!("the points determine no {what}") }
+    }
+
+    pub fn panicked(payload: &(dyn Any + Send)) -> Self {
         let text = payload.downcast_ref::<&str>().copied();
         let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
         let message = format!("internal error: {}", text.unwrap_or("no text"));
@@ -39,10 +51,17 @@ impl Failure {
     }
 }
 
+impl From<surfsig::TransformError> for Failure {
+    fn from(error: surfsig::TransformError) -> Self {
+        Self::invalid_input(error.to_string())
+    }
+}
+
 impl From<surfsig::Error> for Failure {
     fn from(error: surfsig::Error) -> Self {
         let code = match error {
             surfsig::Error::Threads { .. } => surfsig_code::System,
+            surfsig::Error::Cancelled => surfsig_code::Cancelled,
             _ => surfsig_code::InvalidInput,
         };
         Self { code, message: error.to_string() }
@@ -54,7 +73,7 @@ thread_local! {
 }
 
 /// Runs the body of a call: neither an error nor a panic leaves it but as a code and a text.
-pub fn guarded(body: impl FnOnce() -> Result<(), Failure>) -> surfsig_code {
+pub(crate) fn guarded(body: impl FnOnce() -> Result<(), Failure>) -> surfsig_code {
     // A body that panics leaves nothing behind but what the caller gave it to fill.
     let result = catch_unwind(AssertUnwindSafe(body))
         .unwrap_or_else(|payload| Err(Failure::panicked(payload.as_ref())));

@@ -1,111 +1,179 @@
 //! Extraction, and the columns that it gives.
 
-use crate::arrays::points;
+use crate::arrays::{array, put_new, room};
+use crate::cloud::{given, surfsig_cloud};
 use crate::code::{Failure, guarded, surfsig_code};
-use crate::options::{position, surfsig_options};
-use crate::status::surfsig_status;
-use std::borrow::Cow;
-use surfsig::{Extraction, Monitor, Neighborhood, Offsets, PointCloud, Radius, extract_monitored};
+use crate::options::{Prepared, surfsig_options};
+use std::sync::Arc;
+use surfsig::{
+    ExtractOptions, Extraction, FitUsed, Monitor, Neighborhood, PointCloud, Queries, Radius, Status,
+    extract_auto_radius, extract_monitored, extract_radii,
+};
 
-/// What an extraction gives: columns of one length, in the order of the places. Made by
-/// surfsig_extract_f32() or surfsig_extract_f64(), freed by surfsig_extraction_free(). It refers to
-/// nothing of the caller's.
+/// What an extraction gives: columns of one length, in the order of the queries. Made by surfsig_extract() and the
+/// like, freed by surfsig_extraction_free(). It refers to nothing of the caller's.
 pub struct surfsig_extraction {
-    pub found: Extraction,
+    pub(crate) found: Extraction,
+    /// Numbers of the queries in the cloud; empty where these are all of its points, or none of them.
+    indices: Arc<[u32]>,
     /// Threads for what is made from it later.
-    pub threads: Option<usize>,
+    pub(crate) threads: Option<usize>,
 }
 
 /// Extracts curvature from the points within a radius; eq. (5) of the paper, and from it k1 and k2.
 ///
-/// Points that are not finite belong to no ball and get SURFSIG_STATUS_NOT_FINITE. No point at all gives an
-/// extraction of size 0.
+/// A cloud without points gives an extraction of size 0.
 ///
-/// @param points x of the first point; its y and z follow it. May have any alignment; null only if count is 0.
-/// @param count Number of points.
-/// @param stride Bytes from one point's x to the next one's, at least 12: 12 for packed coordinates, which
-/// are used where they are; sizeof(pcl::PointXYZ) and the like otherwise, and the coordinates are copied.
-/// @param origin x, y, z that are added to each point, finite; null for 0, 0, 0.
-/// @param radius Radius of the ball around each place, in the cloud's unit; finite and above 0.
-/// @param options How; null for the default.
+/// @param cloud The points.
+/// @param radius Radius of the ball around each query, in the cloud's unit; finite and above 0.
+/// @param options How, and at which queries; null for the default: at every point.
 /// @param extraction Where the result is put; null is put there where the call fails.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn surfsig_extract_f32(
-    points: *const f32,
-    count: usize,
-    stride: usize,
-    origin: *const f64,
+pub unsafe extern "C" fn surfsig_extract(
+    cloud: Option<&surfsig_cloud>,
     radius: f64,
     options: Option<&surfsig_options>,
     extraction: *mut *mut surfsig_extraction,
 ) -> surfsig_code {
-    // SAFETY: the conditions are the same.
-    unsafe { extract(points, count, stride, origin, radius, options, extraction, |rows| Offsets::F32(rows)) }
-}
-
-/// Extracts curvature from points in double precision, as surfsig_extract_f32() does; the stride is at
-/// least 24 bytes.
-///
-/// @param points x of the first point; its y and z follow it. May have any alignment; null only if count is 0.
-/// @param count Number of points.
-/// @param stride Bytes from one point's x to the next one's.
-/// @param origin x, y, z that are added to each point, finite; null for 0, 0, 0.
-/// @param radius Radius of the ball around each place, in the cloud's unit; finite and above 0.
-/// @param options How; null for the default.
-/// @param extraction Where the result is put; null is put there where the call fails.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn surfsig_extract_f64(
-    points: *const f64,
-    count: usize,
-    stride: usize,
-    origin: *const f64,
-    radius: f64,
-    options: Option<&surfsig_options>,
-    extraction: *mut *mut surfsig_extraction,
-) -> surfsig_code {
-    // SAFETY: the conditions are the same.
-    unsafe { extract(points, count, stride, origin, radius, options, extraction, |rows| Offsets::F64(rows)) }
-}
-
-/// # Safety
-/// `first` is null or points to `count` points, `stride` bytes apart; `origin` is null or points to three
-/// numbers; `extraction` is null or points to where a pointer can be written.
-#[expect(clippy::too_many_arguments, reason = "those of the C functions")]
-unsafe fn extract<T: Copy>(
-    first: *const T,
-    count: usize,
-    stride: usize,
-    origin: *const f64,
-    radius: f64,
-    options: Option<&surfsig_options>,
-    extraction: *mut *mut surfsig_extraction,
-    offsets: impl Fn(&[[T; 3]]) -> Offsets<'_>,
-) -> surfsig_code {
-    guarded(|| {
-        if extraction.is_null() {
-            return Err(Failure::invalid_input("extraction must not be null"));
-        }
-        // SAFETY: not null, and the caller's to be written; what stood there may have had no value.
-        unsafe { extraction.write(std::ptr::null_mut()) };
+    let made = || {
         let radius = Radius::new(radius)?;
-        // SAFETY: the caller's condition.
-        let rows: Cow<'_, [[T; 3]]> = unsafe { points(first, count, stride) }?;
-        // SAFETY: the caller's condition.
-        let origin = unsafe { position(origin, "origin") }?.unwrap_or_default();
-        let default = surfsig_options::default();
-        let options = options.unwrap_or(&default);
-        let cloud = PointCloud { offsets: offsets(&rows), origin };
-        let monitor = Monitor::default();
-        let around = match options.neighbors {
+        let around = match options.and_then(|options| options.neighbors) {
             None => Neighborhood::Ball(radius),
             Some(most) => Neighborhood::Hybrid { radius, most },
         };
-        let found = extract_monitored(&cloud, around, &options.queries(), &options.extract, &monitor)?;
-        let made = Box::new(surfsig_extraction { found, threads: options.extract.threads });
+        one_extraction(cloud, options, |task, monitor| {
+            extract_monitored(task.cloud, around, &task.queries, &task.options, monitor)
+        })
+    };
+    // SAFETY: the caller gives room for a pointer, or null.
+    guarded(|| unsafe { put_new(extraction, "extraction", made) })
+}
+
+/// Extracts curvature from the nearest points of each query, as surfsig_extract() does.
+///
+/// @param cloud The points.
+/// @param neighbors How many, the query itself included where it is a point of the cloud; at least 1.
+/// @param options How, and at which queries; null for the default.
+/// @param extraction Where the result is put; null is put there where the call fails.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn surfsig_extract_nearest(
+    cloud: Option<&surfsig_cloud>,
+    neighbors: u32,
+    options: Option<&surfsig_options>,
+    extraction: *mut *mut surfsig_extraction,
+) -> surfsig_code {
+    let made = || {
+        without_neighbors(options)?;
+        let nearest = Neighborhood::Nearest(neighbors as usize);
+        one_extraction(cloud, options, |task, monitor| {
+            extract_monitored(task.cloud, nearest, &task.queries, &task.options, monitor)
+        })
+    };
+    // SAFETY: the caller gives room for a pointer, or null.
+    guarded(|| unsafe { put_new(extraction, "extraction", made) })
+}
+
+/// Extracts curvature from balls whose radius each query chooses, as surfsig_extract() does: of the radii 2^(i/2), in
+/// the cloud's unit, the largest that the fit still explains. In the surface's axes only.
+///
+/// @param cloud The points.
+/// @param options How, and at which queries; null for the default.
+/// @param extraction Where the result is put; null is put there where the call fails.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn surfsig_extract_auto_radius(
+    cloud: Option<&surfsig_cloud>,
+    options: Option<&surfsig_options>,
+    extraction: *mut *mut surfsig_extraction,
+) -> surfsig_code {
+    let made = || {
+        without_neighbors(options)?;
+        one_extraction(cloud, options, |task, monitor| {
+            extract_auto_radius(task.cloud, &task.queries, &task.options, monitor)
+        })
+    };
+    // SAFETY: the caller gives room for a pointer, or null.
+    guarded(|| unsafe { put_new(extraction, "extraction", made) })
+}
+
+/// Extracts curvature from balls of several radii, in one pass over the points. Values differ from those of
+/// surfsig_extract() with one radius by rounding only.
+///
+/// @param cloud The points.
+/// @param radii Radii of the balls, (count), in the cloud's unit; each finite and above 0.
+/// @param count How many; 0 does nothing.
+/// @param options How, and at which queries; null for the default.
+/// @param extractions Where the results are put, (count), one for each radius in their order, each to be freed; null
+/// is put there where the call fails.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn surfsig_extract_radii(
+    cloud: Option<&surfsig_cloud>,
+    radii: *const f64,
+    count: usize,
+    options: Option<&surfsig_options>,
+    extractions: *mut *mut surfsig_extraction,
+) -> surfsig_code {
+    guarded(|| {
+        // SAFETY: the caller gives room for `count` pointers, and `count` radii.
+        let results = unsafe { room(extractions, count, "extractions") }?;
         // SAFETY: as above.
-        unsafe { extraction.write(Box::into_raw(made)) };
+        let radii = unsafe { array(radii, count, "radii") }?;
+        without_neighbors(options)?;
+        let radii = radii.iter().map(|&radius| Radius::new(radius)).collect::<Result<Vec<_>, _>>()?;
+        let made = extractions_of(cloud, options, radii.len(), |task, monitor| {
+            extract_radii(task.cloud, &radii, &task.queries, &task.options, monitor)
+        })?;
+        for (result, made) in results.iter_mut().zip(made) {
+            *result = Box::into_raw(Box::new(made));
+        }
         Ok(())
     })
+}
+
+/// What an extraction is asked for.
+struct Task<'a> {
+    cloud: &'a PointCloud<'a>,
+    queries: Queries<'a>,
+    options: ExtractOptions<'a>,
+}
+
+/// An error where options say something that is for surfsig_extract() alone.
+fn without_neighbors(options: Option<&surfsig_options>) -> Result<(), Failure> {
+    match options.and_then(|options| options.neighbors) {
+        None => Ok(()),
+        Some(_) => Err(Failure::invalid_input("options with neighbors are for surfsig_extract() only")),
+    }
+}
+
+/// The one extraction of some work.
+fn one_extraction(
+    cloud: Option<&surfsig_cloud>,
+    options: Option<&surfsig_options>,
+    work: impl FnOnce(&Task<'_>, &Monitor) -> Result<Extraction, surfsig::Error> + Send,
+) -> Result<surfsig_extraction, Failure> {
+    let work = |task: &Task<'_>, monitor: &Monitor| Ok(vec![work(task, monitor)?]);
+    Ok(extractions_of(cloud, options, 1, work)?.swap_remove(0))
+}
+
+/// The extractions of some work, watched. The monitor counts each query so many times.
+fn extractions_of(
+    cloud: Option<&surfsig_cloud>,
+    options: Option<&surfsig_options>,
+    times: usize,
+    work: impl FnOnce(&Task<'_>, &Monitor) -> Result<Vec<Extraction>, surfsig::Error> + Send,
+) -> Result<Vec<surfsig_extraction>, Failure> {
+    let cloud = given(cloud)?.view();
+    let default = surfsig_options::default();
+    let options = options.unwrap_or(&default);
+    let prepared: Prepared<'_> = options.prepared(&cloud)?;
+    let task = Task { cloud: &cloud, queries: prepared.queries(), options: prepared.options() };
+    let total = times * task.queries.len(&cloud);
+    let found = options.progress.watched(total, |monitor| work(&task, monitor))?;
+    let indices: Arc<[u32]> = prepared.indices.into();
+    let threads = options.threads;
+    Ok(found
+        .into_iter()
+        .map(|found| surfsig_extraction { found, indices: Arc::clone(&indices), threads })
+        .collect())
 }
 
 /// Frees an extraction and its columns; does nothing with null.
@@ -114,105 +182,68 @@ pub extern "C" fn surfsig_extraction_free(extraction: Option<Box<surfsig_extract
     drop(extraction);
 }
 
-/// Number of places, which is the length of each column; 0 for null.
+/// Number of queries, which is the length of each column; 0 for null.
 #[unsafe(no_mangle)]
 pub extern "C" fn surfsig_extraction_size(extraction: Option<&surfsig_extraction>) -> usize {
     extraction.map_or(0, |extraction| extraction.found.len())
 }
 
-/// A column's first entry; null for an empty one, or where there is no extraction.
-fn column<T, R>(extraction: Option<&surfsig_extraction>, of: impl Fn(&Extraction) -> &[T]) -> *const R {
-    let column = extraction.map_or(&[][..], |extraction| of(&extraction.found));
-    if column.is_empty() { std::ptr::null() } else { column.as_ptr().cast() }
+/// Radius of the balls; of nearest neighbours and of radii that queries chose, of the largest ball that was looked
+/// through. NaN for null.
+#[unsafe(no_mangle)]
+pub extern "C" fn surfsig_extraction_radius(extraction: Option<&surfsig_extraction>) -> f64 {
+    extraction.map_or(f64::NAN, |extraction| extraction.found.radius)
 }
 
-/// Larger principal curvature by value, (size) floats per unit of length; a bump seen from the sensor is
-/// positive. Like every column it lives as long as the extraction; null where that is empty or null.
+/// 1 where a viewpoint or normals say on which side the sensor was; 0 where the side of each normal, and with it the
+/// sign of curvature, is a convention, and for null.
 #[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_k1(extraction: Option<&surfsig_extraction>) -> *const f32 {
-    column(extraction, |found| &found.k1)
+pub extern "C" fn surfsig_extraction_oriented(extraction: Option<&surfsig_extraction>) -> std::ffi::c_int {
+    extraction.is_some_and(|extraction| extraction.found.oriented).into()
 }
 
-/// Smaller principal curvature by value, (size) floats per unit of length.
-#[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_k2(extraction: Option<&surfsig_extraction>) -> *const f32 {
-    column(extraction, |found| &found.k2)
-}
-
-/// Unit normals of the fitted surface, towards the sensor: (size, 3) floats, row by row.
-#[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_normals(extraction: Option<&surfsig_extraction>) -> *const f32 {
-    column(extraction, |found| &found.normals)
-}
-
-/// Unit tangents along k1, (size, 3) floats, row by row; the sign means nothing.
-#[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_directions(extraction: Option<&surfsig_extraction>) -> *const f32 {
-    column(extraction, |found| &found.directions)
-}
-
-/// Root mean square of the points' heights above the fit, (size) floats.
-#[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_residual(extraction: Option<&surfsig_extraction>) -> *const f32 {
-    column(extraction, |found| &found.residual)
-}
-
-/// How much, at least, the worst determined coefficient suffers from the points' arrangement, (size)
-/// floats: the factor on its standard error, 1 for not at all, about 1.5 on a full disc.
-#[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_condition(extraction: Option<&surfsig_extraction>) -> *const f32 {
-    column(extraction, |found| &found.condition)
-}
-
-/// Standard error of (k1 + k2) / 2, (size) floats; NaN in the sensor's axes and where no more than six
-/// points are in the ball.
-#[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_mean_curvature_std(
-    extraction: Option<&surfsig_extraction>,
-) -> *const f32 {
-    column(extraction, |found| &found.mean_curvature_std)
-}
-
-/// Standard error of k1, (size) floats; right where k1 and k2 differ significantly.
-#[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_k1_std(extraction: Option<&surfsig_extraction>) -> *const f32 {
-    column(extraction, |found| &found.k1_std)
-}
-
-/// Standard error of k2, (size) floats.
-#[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_k2_std(extraction: Option<&surfsig_extraction>) -> *const f32 {
-    column(extraction, |found| &found.k2_std)
-}
-
-/// Points in the ball, the place itself included, (size) numbers.
-#[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_count(extraction: Option<&surfsig_extraction>) -> *const u32 {
-    column(extraction, |found| &found.count)
-}
-
-/// What became of each place, (size) bytes.
-#[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_status(
-    extraction: Option<&surfsig_extraction>,
-) -> *const surfsig_status {
-    column(extraction, |found| &found.status)
-}
-
-/// (l1 - l2) / l1 of the covariance's eigenvalues, (size) floats: 1 on a line.
-#[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_linearity(extraction: Option<&surfsig_extraction>) -> *const f32 {
-    column(extraction, |found| &found.linearity)
-}
-
-/// (l2 - l3) / l1, (size) floats: 1 on a plane.
-#[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_planarity(extraction: Option<&surfsig_extraction>) -> *const f32 {
-    column(extraction, |found| &found.planarity)
-}
-
-/// l3 / l1, (size) floats: 1 in a volume.
-#[unsafe(no_mangle)]
-pub extern "C" fn surfsig_extraction_scattering(extraction: Option<&surfsig_extraction>) -> *const f32 {
-    column(extraction, |found| &found.scattering)
+columns! {
+    EXTRACTION_COLUMNS of surfsig_extraction:
+    /// Larger principal curvature by value, (size) floats per unit of length; a bump seen from the sensor is
+    /// positive. Like every column it lives as long as the extraction; null where that is empty or null.
+    surfsig_extraction_k1: f32 = |result| &result.found.k1;
+    /// Smaller principal curvature by value, (size) floats per unit of length.
+    surfsig_extraction_k2: f32 = |result| &result.found.k2;
+    /// Unit normals of the fitted surface, towards the sensor: (size, 3) floats, row by row.
+    surfsig_extraction_normals: [f32; 3] = |result| &result.found.normals;
+    /// Unit tangents along k1, (size, 3) floats, row by row; the sign means nothing.
+    surfsig_extraction_directions: [f32; 3] = |result| &result.found.directions;
+    /// Root mean square of the points' distances from the fit along its height, (size) floats.
+    surfsig_extraction_residual: f32 = |result| &result.found.residual;
+    /// How much, at least, the worst determined coefficient suffers from the points' arrangement, (size)
+    /// floats: the factor on its standard error, 1 for not at all, about 1.5 on a full disc.
+    surfsig_extraction_condition: f32 = |result| &result.found.condition;
+    /// Standard error of (k1 + k2) / 2, (size) floats; NaN in the sensor's axes and where no more than six
+    /// points are in the ball.
+    surfsig_extraction_mean_curvature_std: f32 = |result| &result.found.mean_curvature_std;
+    /// Standard error of k1, (size) floats; right where k1 and k2 differ significantly.
+    surfsig_extraction_k1_std: f32 = |result| &result.found.k1_std;
+    /// Standard error of k2, (size) floats.
+    surfsig_extraction_k2_std: f32 = |result| &result.found.k2_std;
+    /// Points in the ball, the query itself included where it is one of them, (size) numbers.
+    surfsig_extraction_count: u32 = |result| &result.found.count;
+    /// What became of each query, (size) bytes.
+    surfsig_extraction_status: Status = |result| &result.found.status;
+    /// (l1 - l2) / l1 of the covariance's eigenvalues, (size) floats: 1 on a line.
+    surfsig_extraction_linearity: f32 = |result| &result.found.linearity;
+    /// (l2 - l3) / l1, (size) floats: 1 on a plane.
+    surfsig_extraction_planarity: f32 = |result| &result.found.planarity;
+    /// l3 / l1, (size) floats: 1 in a volume.
+    surfsig_extraction_scattering: f32 = |result| &result.found.scattering;
+    /// Radius of each query's neighbourhood, (size) floats: of nearest neighbours the distance to the farthest, or
+    /// the radius that the query chose. Null where all have the same, surfsig_extraction_radius().
+    surfsig_extraction_radii: f32 = |result| &result.found.radii;
+    /// Whose curvature each query has, (size) bytes. Null where only paraboloids were fitted.
+    surfsig_extraction_fit_used: FitUsed = |result| &result.found.fit_used;
+    /// a, b, c, d, e, f of eq. (5) about each query, (size, 6) floats, row by row, with heights that grow away from
+    /// the sensor. Null in the surface's axes.
+    surfsig_extraction_coefficients: [f32; 6] = |result| &result.found.coefficients;
+    /// Numbers of the queries in the cloud, (size). Null where the queries are all points in their order, or
+    /// positions.
+    surfsig_extraction_indices: u32 = |result| &result.indices;
 }

@@ -1,15 +1,43 @@
 //! The C interface: checks what C cannot promise, calls the core, maps the error; nothing else.
 //!
-//! `include/surfsig.h` is generated from the comments and types here, whose names are therefore C's.
+//! `include/surfsig.h` is generated from the comments and types here, whose names are therefore C's; what a call needs
+//! of its pointers stands in its comment there.
 
 #![allow(non_camel_case_types, reason = "the names are those of the C header")]
+#![allow(clippy::missing_safety_doc, reason = "the header's comments say what each pointer must be")]
 
 mod arrays;
+mod cloud;
 mod code;
+#[macro_use]
+mod columns;
 mod extraction;
+mod kind;
+mod moments;
 mod options;
+mod primitive;
+mod progress;
 mod signatures;
 mod status;
+mod surface_options;
+mod surfaces;
+mod transform;
+
+// For the tests, which call what C calls.
+pub use cloud::*;
+pub use code::*;
+pub use columns::{Declaration, Table};
+pub use extraction::*;
+pub use kind::*;
+pub use moments::*;
+pub use options::*;
+pub use primitive::*;
+pub use progress::*;
+pub use signatures::*;
+pub use status::*;
+pub use surface_options::*;
+pub use surfaces::*;
+pub use transform::*;
 
 use std::ffi::{CStr, c_char};
 

@@ -1,6 +1,6 @@
-//! Signatures of places, and how alike they are.
+//! Signatures of queries, and how alike they are.
 
-use crate::arrays::{array, room};
+use crate::arrays::{array, present, room};
 use crate::code::{Failure, guarded, surfsig_code};
 use crate::extraction::surfsig_extraction;
 use crate::status::surfsig_status;
@@ -10,39 +10,37 @@ use surfsig::{Extraction, FitAxes, Frame, SIGNATURE, Status, similarity, with_th
 pub const SURFSIG_SIGNATURE: usize = 242;
 const _: () = assert!(SURFSIG_SIGNATURE == SIGNATURE);
 
-/// Makes the signatures of chosen places, in the default frame. The first call of a process also makes the
+/// Makes the signatures of chosen queries, in the default frame. The first call of a process also makes the
 /// frame, in some tens of milliseconds.
 ///
-/// @param extraction Where the places' surfaces are.
-/// @param places Numbers of places, from 0, (count); null for the first count of them.
+/// @param extraction Where the queries' surfaces are.
+/// @param queries Numbers of queries, from 0, (count); null for the first count of them.
 /// @param count How many; 0 does nothing.
 /// @param signatures Where they are put: (count, 242) floats, row by row; NaN where there is none.
 /// @param statuses Where it is put why, (count); null if nobody asks.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn surfsig_signatures(
     extraction: Option<&surfsig_extraction>,
-    places: *const u32,
+    queries: *const u32,
     count: usize,
     signatures: *mut f32,
     statuses: *mut surfsig_status,
 ) -> surfsig_code {
     guarded(|| {
-        let Some(surfsig_extraction { found, threads }) = extraction else {
-            return Err(Failure::invalid_input("extraction must not be null"));
-        };
-        let places: Vec<usize> = if places.is_null() {
+        let surfsig_extraction { found, threads, .. } = present(extraction, "extraction")?;
+        let queries: Vec<usize> = if queries.is_null() {
             within(count.checked_sub(1), found)?;
             (0..count).collect()
         } else {
             // SAFETY: the caller gives `count` numbers.
-            let places = unsafe { array(places, count, "places") }?;
-            within(places.iter().max().map(|&place| place as usize), found)?;
-            places.iter().map(|&place| place as usize).collect()
+            let queries = unsafe { array(queries, count, "queries") }?;
+            within(queries.iter().max().map(|&query| query as usize), found)?;
+            queries.iter().map(|&query| query as usize).collect()
         };
         // SAFETY: the caller gives room for `count` rows.
         let rows = unsafe { room(signatures.cast::<[f32; SIGNATURE]>(), count, "signatures") }?;
-        let mut made: Vec<Status> = places.iter().map(|&place| found.status[place]).collect();
-        with_threads(*threads, || fill(found, &places, rows, &mut made))?;
+        let mut made: Vec<Status> = queries.iter().map(|&query| found.status[query]).collect();
+        with_threads(*threads, || fill(found, &queries, rows, &mut made))?;
         if !statuses.is_null() {
             // SAFETY: the caller gives room for `count` bytes, and `made` has as many; their numbers are
             // the same in C, which status.rs asserts.
@@ -52,11 +50,11 @@ pub unsafe extern "C" fn surfsig_signatures(
     })
 }
 
-/// An error where the last place is not the extraction's.
+/// An error where the last query is not the extraction's.
 fn within(last: Option<usize>, found: &Extraction) -> Result<(), Failure> {
     match last {
         Some(last) if last >= found.len() => {
-            let message = format!("place {last} is outside an extraction of {} places", found.len());
+            let message = format!("query {last} is outside an extraction of {} queries", found.len());
             Err(Failure::invalid_input(message))
         }
         _ => Ok(()),
@@ -64,19 +62,19 @@ fn within(last: Option<usize>, found: &Extraction) -> Result<(), Failure> {
 }
 
 /// Fills the rows, and marks in `statuses`, which hold the fits' own, what the frame does not reach.
-fn fill(found: &Extraction, places: &[usize], rows: &mut [[f32; SIGNATURE]], statuses: &mut [Status]) {
+fn fill(found: &Extraction, queries: &[usize], rows: &mut [[f32; SIGNATURE]], statuses: &mut [Status]) {
     let frame = Frame::shared();
-    // In patch units a side is 1, where each place has its own radius.
+    // In patch units a side is 1, where each query has its own radius.
     let side = if found.radii.is_empty() { 2.0 * found.radius } else { 1.0 };
     let unit = |i: usize| found.radii.get(i).map_or(1.0, |radius| 2.0 * radius);
     match found.axes {
         FitAxes::Surface => {
             let curvatures: Vec<_> =
-                places.iter().map(|&i| [found.k1[i] * unit(i), found.k2[i] * unit(i)]).collect();
+                queries.iter().map(|&i| [found.k1[i] * unit(i), found.k2[i] * unit(i)]).collect();
             frame.signatures_of_curvatures(side, &curvatures, rows, statuses);
         }
         FitAxes::Sensor => {
-            let surfaces: Vec<_> = places
+            let surfaces: Vec<_> = queries
                 .iter()
                 .map(|&i| {
                     let ([a, b, c, d, e, f], unit) = (found.coefficients[i], unit(i));

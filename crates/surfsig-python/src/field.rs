@@ -6,7 +6,8 @@ use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use surfsig::{
-    FIELD_PHASES, FIELD_SIGNATURE, FieldOptions, FieldPatches, Monitor, PointCloud, Queries, Radius,
+    FIELD_PHASES, FIELD_SIGNATURE, FieldOptions, FieldPatches, FieldPlaces, KeypointOptions, Monitor,
+    PointCloud, Queries, Radius,
 };
 
 /// Make field signatures; see `surfsig.extract_field_signatures`. With `pools` what the frame sees in place of them.
@@ -67,26 +68,108 @@ pub fn field_signatures<'py>(
     Ok(arrays)
 }
 
-/// How unlike each place is to the others; see `surfsig.find_keypoints`.
+/// Choose keypoints; see `surfsig.find_keypoints`. As `field_signatures`, with their numbers in the cloud.
 #[pyfunction]
-#[pyo3(signature = (vectors, places, *, radius, threads=None))]
-pub fn field_distinctiveness<'py>(
+#[pyo3(signature = (points, *, origin, radius, count=None, spacing=None, viewpoint=None, directions=None, threads=None, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
+pub fn field_keypoints<'py>(
     py: Python<'py>,
-    vectors: PyReadonlyArray2<'py, f32>,
-    places: PyReadonlyArray2<'py, f64>,
+    points: Points<'py>,
+    origin: [f64; 3],
     radius: f64,
+    count: Option<usize>,
+    spacing: Option<f64>,
+    viewpoint: Option<[f64; 3]>,
+    directions: Option<PyReadonlyArray2<'py, f32>>,
     threads: Option<usize>,
-) -> PyResult<Bound<'py, PyArray1<f32>>> {
-    let (vectors, places) = (rows::<f32, FIELD_SIGNATURE>(&vectors)?, rows::<f64, 3>(&places)?);
-    if vectors.len() != places.len() {
-        return Err(invalid_input(&format!("{} vectors for {} places", vectors.len(), places.len())));
-    }
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let cloud = points.cloud(origin)?;
     let radius = Radius::new(radius).map_err(to_python)?;
+    let directions = directions.as_ref().map(rows::<f32, 3>).transpose()?;
+    let options = FieldOptions { viewpoint, directions, threads, instruction_set: None };
+    let mut keypoints = KeypointOptions { spacing, ..Default::default() };
+    if let Some(count) = count {
+        keypoints.count = count;
+    }
     let monitor = Monitor::default();
-    let run = || surfsig::field_distinctiveness(vectors, places, radius, threads, &monitor);
-    let found =
-        py.detach(|| watched(run, || Python::attach(|py| py.check_signals()), || monitor.cancel()))?;
-    Ok(found.into_pyarray(py))
+    let report = || -> PyResult<()> {
+        Python::attach(|py| {
+            py.check_signals()?;
+            let done = monitor.done();
+            progress.as_ref().map_or(Ok(()), |call| call.call1(py, (done, done)).map(|_| ()))
+        })
+    };
+    let run = || surfsig::find_keypoints(&cloud, radius, &keypoints, &options, &monitor);
+    let found = py.detach(|| watched(run, report, || monitor.cancel()))?;
+    let arrays = PyDict::new(py);
+    let total = found.len();
+    arrays.set_item("indices", found.indices.into_pyarray(py))?;
+    arrays.set_item("vectors", table(py, found.vectors.into_flattened(), total)?)?;
+    let phases = found.phases.as_flattened().as_flattened().as_flattened().to_vec();
+    arrays.set_item("phases", table(py, phases, total)?)?;
+    arrays.set_item("axes", table(py, found.axes.into_flattened(), total)?)?;
+    arrays.set_item("tangents", table(py, found.tangents.into_flattened(), total)?)?;
+    arrays.set_item("count", found.count.into_pyarray(py))?;
+    Ok(arrays)
+}
+
+/// Points, vectors, axes, tangents and phases of places, row by row.
+#[derive(FromPyObject)]
+pub struct PlacesArgument<'py>(
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray2<'py, f32>,
+    PyReadonlyArray2<'py, f32>,
+    PyReadonlyArray2<'py, f32>,
+    PyReadonlyArray2<'py, f32>,
+);
+
+impl PlacesArgument<'_> {
+    fn places(&self) -> PyResult<FieldPlaces> {
+        const PHASES: usize = 14 * FIELD_PHASES;
+        let phases = rows::<f32, PHASES>(&self.4)?.as_flattened().as_chunks::<2>().0;
+        let orders = phases.as_chunks::<FIELD_PHASES>().0.as_chunks::<7>().0;
+        let places = FieldPlaces {
+            points: rows::<f64, 3>(&self.0)?.to_vec(),
+            vectors: rows::<f32, FIELD_SIGNATURE>(&self.1)?.to_vec(),
+            axes: rows::<f32, 3>(&self.2)?.to_vec(),
+            tangents: rows::<f32, 3>(&self.3)?.to_vec(),
+            phases: orders.to_vec(),
+            ..FieldPlaces::new(1.0)
+        };
+        let lengths = [places.vectors.len(), places.axes.len(), places.tangents.len(), places.phases.len()];
+        if lengths != [places.len(); 4] {
+            return Err(invalid_input("places must have one vector, axis, tangent and phases each"));
+        }
+        Ok(places)
+    }
+}
+
+/// Match places; see `surfsig.match_fields`. Numbers of both, distances, and transforms row by row.
+#[pyfunction]
+#[pyo3(signature = (source, target, *, mutual, threads=None))]
+pub fn match_fields<'py>(
+    py: Python<'py>,
+    source: PlacesArgument<'py>,
+    target: PlacesArgument<'py>,
+    mutual: bool,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (source, target) = (source.places()?, target.places()?);
+    let run = || surfsig::with_threads(threads, || surfsig::match_fields(&source, &target, mutual));
+    let found = py.detach(run).map_err(to_python)?;
+    let arrays = PyDict::new(py);
+    let numbers = |of: fn(&surfsig::FieldMatch) -> usize| -> Vec<i64> {
+        found.iter().map(|one| of(one) as i64).collect()
+    };
+    arrays.set_item("source", numbers(|one| one.source).into_pyarray(py))?;
+    arrays.set_item("target", numbers(|one| one.target).into_pyarray(py))?;
+    let distances: Vec<f32> = found.iter().map(|one| one.distance).collect();
+    arrays.set_item("distances", distances.into_pyarray(py))?;
+    let transforms: Vec<f64> =
+        found.iter().flat_map(|one| one.T_target_source.to_matrix()).flatten().collect();
+    arrays.set_item("poses", transforms.into_pyarray(py).reshape([found.len(), 4, 4])?)?;
+    Ok(arrays)
 }
 
 /// As many rows as there are places.

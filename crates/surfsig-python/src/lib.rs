@@ -8,6 +8,8 @@ mod frame;
 mod odometry;
 mod primitive;
 mod python_file;
+mod registration;
+mod settings;
 mod surface_index;
 mod surfaces;
 
@@ -60,13 +62,15 @@ mod _surfsig {
     #[pymodule_export]
     use crate::extract::{coordinate_steps, extract, voxel_representatives};
     #[pymodule_export]
-    use crate::field::{field_distinctiveness, field_signatures};
+    use crate::field::{field_keypoints, field_signatures, match_fields};
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]
     use crate::odometry::Odometry;
     #[pymodule_export]
     use crate::primitive::{Primitive, fit_primitive};
+    #[pymodule_export]
+    use crate::registration::{RegistrationSettings, consistent_directions, free_directions, register};
     #[pymodule_export]
     use crate::surface_index::SurfaceIndex;
     #[pymodule_export]
@@ -79,6 +83,7 @@ mod _surfsig {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("STATUS_NAMES", surfsig::Status::ALL.map(surfsig::Status::name).to_vec())?;
+        module.add("SCAN_STATUS_NAMES", surfsig::ScanStatus::ALL.map(surfsig::ScanStatus::name).to_vec())?;
         let parameters = surfsig::SurfaceKind::ALL.map(|kind| (kind.name(), kind.parameters()));
         module.add("KIND_PARAMETERS", parameters.into_py_dict(module.py())?)?;
         module.add("FEWEST_SURFACE_POINTS", surfsig::FEWEST_SURFACE_POINTS)?;

@@ -5,7 +5,7 @@ use crate::to_python;
 use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use surfsig::{OdometrySettings, Scan, ScanStatus};
+use surfsig::{OdometrySettings, Scan};
 
 /// Follows a sensor from scan to scan; see the crate's `Odometry`.
 #[pyclass(module = "surfsig._surfsig")]
@@ -70,12 +70,5 @@ impl Odometry {
         arrays.set_item("status", status.into_pyarray(py))?;
         arrays.set_item("overlaps", overlaps.into_pyarray(py))?;
         Ok(arrays)
-    }
-
-    /// Names of the statuses, in the order of their numbers.
-    #[classattr]
-    #[pyo3(name = "STATUS_NAMES")]
-    fn status_names() -> Vec<&'static str> {
-        ScanStatus::ALL.map(ScanStatus::name).to_vec()
     }
 }

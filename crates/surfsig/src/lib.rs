@@ -95,6 +95,7 @@ pub use odometry::{
     ExpectationSettings, MapSettings, Odometry, OdometrySettings, PredictionSettings, RelocalisationSettings,
     ScaleSettings, ScanAlignmentSettings, ScanPose, ScanStatus,
 };
+pub use orientation::consistent_directions;
 pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
 pub use registration::{REGISTRATION_STEPS, Registration, RegistrationSettings, register};

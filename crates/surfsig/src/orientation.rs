@@ -2,7 +2,9 @@
 
 use crate::extract::extract_within;
 use crate::kd_tree::KdTree;
-use crate::{Error, ExtractOptions, Monitor, PointCloud, Queries, Radius, voxel_representatives};
+use crate::{
+    Error, ExtractOptions, Monitor, PointCloud, Queries, Radius, voxel_representatives, with_threads,
+};
 use rayon::prelude::*;
 
 /// Voxels: the radius of the balls from which normals are taken, some twenty points of a thinned surface.
@@ -16,8 +18,29 @@ const DISTANCE_WEIGHT: f64 = 0.01;
 /// Of each point a normal that is on one side of its piece of surface, which side is open; `points` are finite.
 ///
 /// The side is handed on from neighbour to neighbour, where normals differ least first (Hoppe and others, Surface
-/// reconstruction from unorganized points, 1992).
-pub(crate) fn consistent_directions(
+/// reconstruction from unorganized points, 1992). `voxel` is the distance between the points that hand it on.
+///
+/// # Errors
+/// [`Error::InvalidRadius`] for a voxel that is none; [`Error::Threads`], [`Error::Cancelled`].
+///
+/// ```
+/// use surfsig::{consistent_directions, Monitor};
+/// let square: Vec<[f64; 3]> = (0..900).map(|i| [f64::from(i % 30), f64::from(i / 30), 0.0]).collect();
+/// let found = consistent_directions(&square, 1.0, None, &Monitor::default())?;
+/// assert!(found.iter().all(|direction| *direction == found[0]) && found[0][2].abs() > 0.999);
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+pub fn consistent_directions(
+    points: &[[f64; 3]],
+    voxel: f64,
+    threads: Option<usize>,
+    monitor: &Monitor,
+) -> Result<Vec<[f32; 3]>, Error> {
+    with_threads(threads, || directions_within(points, voxel, monitor))?
+}
+
+/// The same, on the threads that are there.
+pub(crate) fn directions_within(
     points: &[[f64; 3]],
     voxel: f64,
     monitor: &Monitor,
@@ -129,20 +152,19 @@ mod tests {
                 [r * cosine, r * sine, z]
             })
             .collect();
-        let found = consistent_directions(&points, 0.1, &Monitor::default()).unwrap();
+        let found = consistent_directions(&points, 0.1, None, &Monitor::default()).unwrap();
         let outwards = |(point, normal): (&[f64; 3], &[f32; 3])| {
             (0..3).map(|k| point[k] * f64::from(normal[k])).sum::<f64>()
         };
         let signs: Vec<f64> = points.iter().zip(&found).map(outwards).collect();
         assert!(signs.iter().all(|&s| s > 0.9) || signs.iter().all(|&s| s < -0.9));
-        let again = crate::with_threads(Some(1), || consistent_directions(&points, 0.1, &Monitor::default()));
-        assert_eq!(again.unwrap().unwrap(), found);
+        assert_eq!(consistent_directions(&points, 0.1, Some(1), &Monitor::default()).unwrap(), found);
     }
 
     #[test]
     fn points_without_a_surface_get_some_direction() {
         let points = [[0.0; 3], [5.0, 0.0, 0.0]];
-        let found = consistent_directions(&points, 0.1, &Monitor::default()).unwrap();
+        let found = consistent_directions(&points, 0.1, None, &Monitor::default()).unwrap();
         assert_eq!(found, [[0.0, 0.0, 1.0]; 2]);
     }
 }

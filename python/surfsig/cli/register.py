@@ -85,7 +85,7 @@ def register_command(
     found = surfsig.register(moving, still, init=start, radius=radius, threads=threads)
     known = bool(np.isfinite(found.T_target_source).all())
     if output is not None and known:
-        surfsig.write(output, found.moved(moving))
+        surfsig.write(output, found.transform_cloud(moving))
     if report is not None:
         found.write_report(report, moving, still, title=f"{source.name} in {target.name}")
     if as_json:

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surfsig import cloud_transforms, geometry
 from surfsig.alignment.free_directions import FreeDirection
-from surfsig.cloud_transforms import transform_cloud
 from surfsig.digits import position_text
-from surfsig.geometry import transform_points
 from surfsig.point_cloud import PointCloud, coordinate_array
 
 Array = NDArray[np.float64]
@@ -30,17 +29,17 @@ class Registration:
     T_target_source: Array
     """(4, 4): a point p of the source is at R p + t of the target."""
     covariance: Array
-    """(6, 6), of the small motion (rotation vector in radians, then translation) in the target's axes, about
-    `center`, that brings the given pose onto the true one: T_true = shift(center) exp(motion) shift(-center)
-    T_target_source. Large in the free directions."""
+    """(6, 6), of the small twist (rotation vector in radians, then translation) in the target's axes, about
+    `center`, that takes the given transform to the true one: T_true = T(center) exp(twist) T(-center)
+    T_target_source, where T(c) is the translation by c. Large in the free directions."""
     center: Array
     """Middle of what overlaps, (3,), in the target's coordinates."""
     free_directions: list[FreeDirection]
-    """Motions of the source, in the target's coordinates, in which the geometry does not hold it."""
+    """Motions of the source, in the target's coordinates, that the overlap does not determine."""
     matches: int
-    """Pairs of places that look alike; 0 where a start was given."""
+    """Keypoints that were matched; 0 where a start was given."""
     inliers: int
-    """Those of them that agree with the pose."""
+    """Those of them that agree with the transform."""
     overlap: float
     """Share of the source's surface that lies on the target's, 0 to 1."""
     rms: float
@@ -60,7 +59,7 @@ class Registration:
             f"overlap {self.overlap:.2f}, rms {self.rms:.3g}{free})"
         )
 
-    def apply(self, points: ArrayLike) -> Array:
+    def transform_points(self, points: ArrayLike) -> Array:
         """Move points of the source into the target.
 
         Parameters
@@ -77,9 +76,11 @@ class Registration:
         InvalidInputError
             If they are no points.
         """
-        return transform_points(self.T_target_source, coordinate_array(points, "points").astype(np.float64))
+        return geometry.transform_points(
+            self.T_target_source, coordinate_array(points, "points").astype(np.float64)
+        )
 
-    def moved(self, cloud: PointCloud) -> PointCloud:
+    def transform_cloud(self, cloud: PointCloud) -> PointCloud:
         """Move a cloud of the source into the target, its viewpoint and normals with it.
 
         Parameters
@@ -91,7 +92,7 @@ class Registration:
         -------
         A cloud of its own, with all fields.
         """
-        return transform_cloud(self.T_target_source, cloud)
+        return cloud_transforms.transform_cloud(self.T_target_source, cloud)
 
     def rows(self) -> list[tuple[str, str]]:
         """Describe the result for people.
@@ -148,7 +149,7 @@ class Registration:
         groups = [
             Group(still, target.points, _BLUE),
             Group(moving, source.points, _ORANGE, state="before"),
-            Group(moving, self.apply(source.points), _ORANGE, state="after"),
+            Group(moving, self.transform_points(source.points), _ORANGE, state="after"),
         ]
         trusted = "trusted" if self.trusted else "not trusted"
         text = f"The source before and after it was moved into the target: {trusted}."

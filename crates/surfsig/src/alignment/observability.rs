@@ -96,6 +96,9 @@ pub fn free_directions(points: &[[f64; 3]], normals: &[[f64; 3]]) -> Vec<FreeDir
 /// Rotations and translations that span free motions, which are twists about `center` with rotations in units of
 /// `unit`.
 fn named(motions: &[Vector6<f64>], center: Vector3<f64>, unit: f64) -> Vec<FreeDirection> {
+    if motions.is_empty() {
+        return Vec::new();
+    }
     // The combinations of free motions with the largest rotational parts come first: left singular vectors of these.
     let mut rotational = SMatrix::<f64, 6, 3>::zeros();
     for (row, motion) in motions.iter().enumerate() {
@@ -185,7 +188,7 @@ mod tests {
     fn a_sphere_rotates_about_its_centre() {
         let on = |(u, v): (f64, f64)| {
             let normal = Vector3::new(u - 0.4, v - 0.7, 0.5).normalize();
-            ((3.0 * normal).into(), normal.into())
+            (<[f64; 3]>::from(3.0 * normal), <[f64; 3]>::from(normal))
         };
         let (points, normals) = grid().map(on).unzip();
         let (pose, found) = moved(points, normals);

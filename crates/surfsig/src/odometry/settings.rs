@@ -189,7 +189,13 @@ pub struct MapSettings {
 
 impl Default for MapSettings {
     fn default() -> Self {
-        Self { normal_neighbors: 20, max_thickness: 0.35, min_translation: 1.0, min_rotation: 0.03, range_factor: 1.2 }
+        Self {
+            normal_neighbors: 20,
+            max_thickness: 0.35,
+            min_translation: 1.0,
+            min_rotation: 0.03,
+            range_factor: 1.2,
+        }
     }
 }
 

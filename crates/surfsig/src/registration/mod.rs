@@ -15,7 +15,7 @@ use crate::alignment::{
 };
 use crate::field::{KeypointOptions, keypoints_within, match_fields};
 use crate::geometry::RigidTransform;
-use crate::orientation::consistent_directions;
+use crate::orientation::directions_within;
 use crate::scan::CenteredScan;
 use crate::voxels::voxel_means;
 use crate::{Error, FieldOptions, FieldPlaces, Monitor, PointCloud, Radius, Scan, with_threads};
@@ -60,6 +60,7 @@ pub fn register(
     settings: &RegistrationSettings,
     monitor: &Monitor,
 ) -> Result<Registration, Error> {
+    settings.radius.map(Radius::new).transpose()?;
     with_threads(settings.threads, || {
         let scans = [CenteredScan::new(source), CenteredScan::new(target)];
         registered(&scans[0], &scans[1], start, settings, monitor)
@@ -142,7 +143,7 @@ fn matched(
 ) -> Result<Correspondences, Error> {
     let oriented = |scan: &CenteredScan| -> Result<Option<Vec<[f32; 3]>>, Error> {
         let voxel = radius.get() / settings.orientation_voxels_per_radius;
-        Ok(Some(consistent_directions(&scan.points, voxel, monitor)?))
+        Ok(Some(directions_within(&scan.points, voxel, monitor)?))
     };
     let is_known = [source, target].map(|scan| scan.scan().is_oriented());
     let theirs = if is_known[1] { None } else { oriented(target)? };

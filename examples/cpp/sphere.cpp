@@ -36,21 +36,21 @@ int main() try {
   const auto found = surfsig::extract(cloud, radius, surfsig::Options().viewpoint({0.0, 0.0, 2.0}));
 
   const std::uint32_t patch = side * side, middle = side * (side / 2) + side / 2;
-  const std::vector<std::uint32_t> places{middle, patch + middle, 2 * patch + middle};
-  const auto signatures = found.signatures(places);
+  const std::vector<std::uint32_t> chosen{middle, patch + middle, 2 * patch + middle};
+  const auto signatures = found.signatures(chosen);
 
-  std::printf("surfsig %s\n%8s%10s%10s%8s%12s%8s\n", surfsig_version(), "place", "k1 [1/m]", "k2 [1/m]", "count",
-              "status", "zeta");
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const auto place = places[i];
+  std::printf("surfsig %s\n%8s%10s%10s%8s%12s%8s\n", surfsig_version(), "point", "k1 [1/m]", "k2 [1/m]",
+              "count", "status", "zeta");
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    const auto point = chosen[i];
     const double zeta = surfsig::similarity(signatures[0], signatures[i]);
-    std::printf("%8u%10.3f%10.3f%8u%12s%8.3f\n", place, found.k1()[place], found.k2()[place],
-                found.count()[place], surfsig_status_name(found.status()[place]), zeta);
+    std::printf("%8u%10.3f%10.3f%8u%12s%8.3f\n", point, found.k1()[point], found.k2()[point],
+                found.count()[point], surfsig_status_name(found.status()[point]), zeta);
   }
 
   // A sphere's curvature is 1/r in every direction.
-  const bool right = std::abs(found.k1()[middle] * 0.1 - 1) < 0.01 && std::abs(found.k2()[middle] * 0.1 - 1) < 0.01;
-  return right ? 0 : 1;
+  const auto is_right = [](float k) { return std::abs(k * 0.1 - 1) < 0.01; };
+  return is_right(found.k1()[middle]) && is_right(found.k2()[middle]) ? 0 : 1;
 } catch (const std::exception &error) {
   std::fprintf(stderr, "%s\n", error.what());
   return 1;

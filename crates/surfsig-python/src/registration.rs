@@ -1,0 +1,138 @@
+//! Registration of scans, for Python.
+
+use crate::extract::{Points, watched};
+use crate::settings::settings_class;
+use crate::{invalid_input, rows};
+use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2, ToPyArray};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use surfsig::{FreeDirection, Monitor, REGISTRATION_STEPS, RigidTransform, Scan};
+
+/// Points (n, 3), their origin, where the sensor stood, and in place of that vectors (n, 3) to its side.
+#[derive(FromPyObject)]
+pub struct ScanArgument<'py>(Points<'py>, [f64; 3], Option<[f64; 3]>, Option<PyReadonlyArray2<'py, f32>>);
+
+impl ScanArgument<'_> {
+    pub fn scan(&self) -> PyResult<Scan<'_>> {
+        let cloud = self.0.cloud(self.1)?;
+        let directions = self.3.as_ref().map(rows::<f32, 3>).transpose()?;
+        if directions.is_some_and(|directions| directions.len() != cloud.len()) {
+            return Err(invalid_input("there must be one direction for each point"));
+        }
+        Ok(Scan { cloud, viewpoint: self.2, directions })
+    }
+}
+
+settings_class! {
+    /// How scans are registered, for experts; see `surfsig.register`.
+    RegistrationSettings of surfsig::RegistrationSettings {
+        radius_share: f64 = radius_share,
+        keypoints: usize = keypoints,
+        candidates_per_radius: f64 = candidates_per_radius,
+        voxels_per_radius: f64 = voxels_per_radius,
+        orientation_voxels_per_radius: f64 = orientation_voxels_per_radius,
+        consensus_max_distance: f64 = consensus.max_distance,
+        consensus_min_cosine: f64 = consensus.min_cosine,
+        consensus_proposals: usize = consensus.proposals,
+        gicp_distances: [f64; 2] = gicp_distances,
+        gicp_iterations: usize = gicp_iterations,
+        surface_max_distance: f64 = point_to_surface.max_distance,
+        surface_max_deviations: f64 = point_to_surface.max_deviations,
+        surface_max_iterations: usize = point_to_surface.max_iterations,
+        max_points: usize = max_points,
+        trusted_inliers: usize = trusted_inliers,
+        trusted_overlap: f64 = trusted_overlap,
+        trusted_overlap_of_start: f64 = trusted_overlap_of_start,
+    }
+}
+
+/// Register two scans; see `surfsig.register`. By the names of its result, of which a transform is None where there
+/// is none.
+#[pyfunction]
+#[pyo3(signature = (source, target, *, start=None, radius=None, keypoints=None, settings=None, threads=None, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
+pub fn register<'py>(
+    py: Python<'py>,
+    source: ScanArgument<'py>,
+    target: ScanArgument<'py>,
+    start: Option<[[f64; 4]; 4]>,
+    radius: Option<f64>,
+    keypoints: Option<usize>,
+    settings: Option<RegistrationSettings>,
+    threads: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (source, target) = (source.scan()?, target.scan()?);
+    let start = start.map(|matrix| RigidTransform::from_matrix(&matrix)).transpose();
+    let start = start.map_err(|error| invalid_input(&error.to_string()))?;
+    let mut settings = settings.map_or_else(surfsig::RegistrationSettings::default, |settings| settings.core);
+    settings.radius = radius;
+    settings.threads = threads;
+    if let Some(count) = keypoints {
+        settings.keypoints = count;
+    }
+    let monitor = Monitor::default();
+    let report = || -> PyResult<()> {
+        Python::attach(|py| {
+            py.check_signals()?;
+            let call = |call: &Py<PyAny>| call.call1(py, (monitor.done(), REGISTRATION_STEPS)).map(|_| ());
+            progress.as_ref().map_or(Ok(()), call)
+        })
+    };
+    let run = || surfsig::register(&source, &target, start.as_ref(), &settings, &monitor);
+    let found = py.detach(|| watched(run, report, || monitor.cancel()))?;
+    report()?;
+    let result = PyDict::new(py);
+    let matrix = found.T_target_source.map(|transform| transform.to_matrix().to_vec());
+    result.set_item("T_target_source", matrix)?;
+    result.set_item("covariance", found.covariance.as_flattened().to_pyarray(py).reshape([6, 6])?)?;
+    result.set_item("center", found.center.to_pyarray(py))?;
+    result.set_item("free_directions", free_directions_to_python(&found.free_directions))?;
+    result.set_item("matches", found.matches)?;
+    result.set_item("inliers", found.inliers)?;
+    result.set_item("overlap", found.overlap)?;
+    result.set_item("rms", found.rms)?;
+    result.set_item("radius", found.radius)?;
+    result.set_item("trusted", found.trusted)?;
+    Ok(result)
+}
+
+/// Motions that points with unit normals slide along; see `surfsig.FreeDirection`. Of each its kind, axis and point.
+#[pyfunction]
+pub fn free_directions(
+    points: PyReadonlyArray2<'_, f64>,
+    normals: PyReadonlyArray2<'_, f64>,
+) -> PyResult<Vec<FreeDirectionTuple>> {
+    let (points, normals) = (rows::<f64, 3>(&points)?, rows::<f64, 3>(&normals)?);
+    Ok(free_directions_to_python(&surfsig::free_directions(points, normals)))
+}
+
+/// Kind, axis and point, of which either may be missing.
+type FreeDirectionTuple = (&'static str, Option<[f64; 3]>, Option<[f64; 3]>);
+
+/// The arguments of `surfsig.FreeDirection`.
+pub fn free_directions_to_python(directions: &[FreeDirection]) -> Vec<FreeDirectionTuple> {
+    let tuple = |direction: &FreeDirection| match *direction {
+        FreeDirection::Translation { axis } => ("translation", Some(axis), None),
+        FreeDirection::Rotation { axis, point } => ("rotation", Some(axis), Some(point)),
+        FreeDirection::RotationAboutPoint { point } => ("rotation", None, Some(point)),
+    };
+    directions.iter().map(tuple).collect()
+}
+
+/// Directions (n, 3) of points (n, 3) that are all on one side of each piece of surface, which side is open.
+#[pyfunction]
+#[pyo3(signature = (points, *, voxel, threads=None))]
+pub fn consistent_directions<'py>(
+    py: Python<'py>,
+    points: PyReadonlyArray2<'py, f64>,
+    voxel: f64,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let points = rows::<f64, 3>(&points)?;
+    let monitor = Monitor::default();
+    let run = || surfsig::consistent_directions(points, voxel, threads, &monitor);
+    let check = || Python::attach(|py| py.check_signals());
+    let found = py.detach(|| watched(run, check, || monitor.cancel()))?;
+    Ok(found.into_flattened().into_pyarray(py).reshape([points.len(), 3])?.into_any())
+}
