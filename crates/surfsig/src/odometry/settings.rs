@@ -155,7 +155,7 @@ impl Default for ScanAlignmentSettings {
             max_iterations: 30,
             rotation_epsilon: 1e-3,
             translation_epsilon: 1e-2,
-            coarse_voxel: 2.0,
+            coarse_voxel: 1.5,
             plane_steps: 2,
             max_point_distance: 2.0,
             max_residual: 0.5,
