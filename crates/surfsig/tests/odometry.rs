@@ -21,7 +21,7 @@ fn furniture() -> Vec<Cuboid> {
         let draw = |k: u64| number(100 * i + k);
         let [length, width, height] = [0, 1, 2].map(|k| 0.3 + 0.9 * draw(k));
         let x = -3.9 + 7.2 * draw(3);
-        let y = if i % 2 == 0 { -2.95 + 0.4 * draw(4) } else { 3.4 - width - 0.4 * draw(4) };
+        let y = if i.is_multiple_of(2) { -2.95 + 0.4 * draw(4) } else { 3.4 - width - 0.4 * draw(4) };
         [[x, y, -1.4], [x + length, y + width, -1.4 + 2.2 * height]]
     };
     (0..14).map(one).collect()
@@ -51,7 +51,7 @@ fn scan(room: &Cuboid, boxes: &[Cuboid], pose: &RigidTransform, seed: u64) -> Ve
         let noise = (0..4).map(|k| number(seed * 100_000_000 + 10 * i + k) - 0.5).sum::<f64>() * 0.0087;
         own.map(|c| c * (range + noise))
     };
-    (0..32 * 360).map(point).filter(|point| point.iter().all(|c| c.abs() < 100.0)).collect()
+    (0..32 * 360).map(point).collect()
 }
 
 /// Along a curve through the room, 15 cm a step, and swaying.
@@ -140,7 +140,10 @@ fn the_result_is_the_same_on_any_number_of_threads() {
 fn motion_along_a_corridor_is_not_observable() {
     let corridor = [[-500.0, -1.0, -1.4], [500.0, 1.2, 1.6]];
     let at = |step: u64| RigidTransform::from_rotation_vector([0.0; 3], [0.2 * step as f64, 0.0, 0.0]);
-    let scans: Vec<Vec<[f64; 3]>> = (0..4).map(|step| scan(&corridor, &[], &at(step), step)).collect();
+    // The sensor sees six metres far; the normals of points farther away are those of planes through both walls.
+    let is_near = |point: &[f64; 3]| point.iter().map(|c| c * c).sum::<f64>() < 36.0;
+    let seen = |step| scan(&corridor, &[], &at(step), step).into_iter().filter(is_near).collect();
+    let scans: Vec<Vec<[f64; 3]>> = (0..4).map(seen).collect();
     let found = follow(&scans, OdometrySettings::default());
     assert_eq!(found[0].status, ScanStatus::Tracked);
     assert!(found[1..].iter().all(|pose| pose.status == ScanStatus::Lost && pose.T_map_scan.is_none()));

@@ -34,8 +34,8 @@ class Odometry:
     poses: Array
     """T_world_scan, (n, 4, 4)."""
     covariances: Array
-    """Of the twist m (rotation vector in radians, then translation) in the scan's own frame by which a pose is
-    off, (n, 6, 6): T_true = T_world_scan exp(m). It grows as the map goes on from the first scan."""
+    """Of the twist m (rotation vector in radians, then translation) in the scan's own frame by which a pose
+    is off, (n, 6, 6): T_true = T_world_scan exp(m). It grows as the map goes on from the first scan."""
     status: NDArray[np.uint8]
     """`ScanStatus` as a number, (n,)."""
     overlaps: Array
@@ -44,7 +44,8 @@ class Odometry:
     """In seconds, (n,): from the recording, or the files' names where these are numbers; otherwise the scans'
     numbers."""
     voxel: float
-    """Edge of the voxels in which scans and map were thinned, in the scans' unit; NaN if no scan had enough points."""
+    """Edge of the voxels in which scans and map were thinned, in the scans' unit; NaN if no scan had enough
+    points."""
 
     def __len__(self) -> int:
         """Return the number of scans."""

@@ -38,10 +38,10 @@ def estimate_odometry(
 ) -> Odometry:
     """Estimate the trajectory of a sensor from its scans.
 
-    Each scan is aligned with a map of the surroundings that earlier scans have seen, from the pose to which the
-    last motion leads. Where it lies there worse than scans did of late, it is searched among keyframes by the
-    signatures of its keypoints; a pose that is found so counts only if the map explains all of the scan, or the
-    next scans follow it. Nothing needs to be set, and the result is always the same.
+    Each scan is aligned with a map of the surroundings that earlier scans have seen, from the pose to which
+    the last motion leads. Where it lies there worse than scans did of late, it is searched among keyframes by
+    the signatures of its keypoints; a pose that is found so counts only if the map explains all of the scan,
+    or the next scans follow it. Nothing needs to be set, and the result is always the same.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ def estimate_odometry(
         Edge of the voxels in which scans and map are thinned, in the scans' unit; by default such that the
         first scan fills 4,000.
     distance
-        Largest distance between points that correspond, in the scans' unit; by default three root mean squares
-        of the errors of earlier predictions.
+        Largest distance between points that correspond, in the scans' unit; by default three root mean
+        squares of the errors of earlier predictions.
     map_range
         Distance from the sensor up to which the map is kept, in the scans' unit; by default 1.2 times the
         distance within which 99 in 100 points of a scan are.
@@ -84,6 +84,7 @@ def estimate_odometry(
         If a file cannot be read, which then counts as a scan without points, a bag ends too early, or missing
         returns at (0, 0, 0) are left out.
     """
+
     def length(value: float | None, name: str) -> float | None:
         return None if value is None else positive_length(value, name)
 

@@ -16,14 +16,21 @@ const PART: usize = 1024;
 /// While a point has moved by d since, all others are at least as far as the second nearest was, less d (Greenspan and
 /// Godin, A nearest neighbor method for efficient ICP, 2001). So the result is that of looking up each anew.
 pub(super) struct Correspondences {
-    looked_up: Vec<([f64; 3], Nearest)>,
+    looked_up: Vec<LookedUp>,
     found: Vec<Option<(u32, f64)>>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct LookedUp {
+    at: [f64; 3],
+    nearest: Nearest,
 }
 
 impl Correspondences {
     pub fn new(count: usize) -> Self {
         let nothing = Nearest { index: u32::MAX, squared: f64::INFINITY, next: 0.0 };
-        Self { looked_up: vec![([0.0; 3], nothing); count], found: vec![None; count] }
+        let looked_up = LookedUp { at: [0.0; 3], nearest: nothing };
+        Self { looked_up: vec![looked_up; count], found: vec![None; count] }
     }
 
     /// Number and squared distance of the nearest point of the map within `reach` of each point of a scan.
@@ -34,10 +41,7 @@ impl Correspondences {
         pose: &RigidTransform,
         reach: f64,
     ) -> &[Option<(u32, f64)>] {
-        let of_point = |(point, ((at, nearest), found)): (
-            &[f64; 3],
-            (&mut ([f64; 3], Nearest), &mut Option<(u32, f64)>),
-        )| {
+        let of_point = |point: &[f64; 3], LookedUp { at, nearest }: &mut LookedUp| {
             let moved = pose.transform_point(*point);
             let farthest = nearest.next - squared_distance(&moved, at).sqrt();
             let squared = match nearest.is_some() {
@@ -45,16 +49,16 @@ impl Correspondences {
                 false => reach * reach,
             };
             if farthest > 0.0 && squared < farthest * farthest {
+                // Others are as far as they were where it was looked up.
                 nearest.squared = squared;
-                // The bound is the one from where it was looked up.
             } else {
                 (*at, *nearest) = (moved, map.nearest(moved, reach + SLACK));
             }
             let is_near = nearest.is_some() && nearest.squared < reach * reach;
-            *found = is_near.then_some((nearest.index, nearest.squared));
+            is_near.then_some((nearest.index, nearest.squared))
         };
-        let state = self.looked_up.par_iter_mut().zip(&mut self.found);
-        points.par_iter().zip(state).with_min_len(PART).for_each(of_point);
+        let found = points.par_iter().zip(&mut self.looked_up).with_min_len(PART);
+        found.map(|(point, looked_up)| of_point(point, looked_up)).collect_into_vec(&mut self.found);
         &self.found
     }
 }

@@ -17,7 +17,7 @@ use crate::visibility::RangeImageSettings;
 /// let wrong = OdometrySettings { map_range: Some(-1.0), ..Default::default() };
 /// assert_eq!(Odometry::new(wrong).unwrap_err().to_string(), "map_range must be a finite number above 0, not -1");
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct OdometrySettings {
     /// Edge of the voxels in which scans and map are thinned, in the scans' unit; by default such that the first scan
     /// fills `scale.voxels_of_scan`.
@@ -44,24 +44,6 @@ pub struct OdometrySettings {
     pub relocalisation: RelocalisationSettings,
     /// What a scan looked through; lengths in voxels.
     pub range_image: RangeImageSettings,
-}
-
-impl Default for OdometrySettings {
-    fn default() -> Self {
-        Self {
-            voxel: None,
-            max_correspondence_distance: None,
-            map_range: None,
-            threads: None,
-            scale: ScaleSettings::default(),
-            alignment: ScanAlignmentSettings::default(),
-            map: MapSettings::default(),
-            prediction: PredictionSettings::default(),
-            expectation: ExpectationSettings::default(),
-            relocalisation: RelocalisationSettings::default(),
-            range_image: RangeImageSettings::default(),
-        }
-    }
 }
 
 impl OdometrySettings {
