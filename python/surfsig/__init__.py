@@ -13,7 +13,7 @@ odometry = surfsig.estimate_odometry("scans")  # poses of a moving sensor, by it
 `__version__` is the package's version, `INSTRUCTION_SET` the instructions that its kernels run on here.
 """
 
-from surfsig._surfsig import INSTRUCTION_SET, Frame, __version__
+from surfsig._surfsig import INSTRUCTION_SET, Frame, RegistrationSettings, __version__
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.clean import crop, downsample, remove_outliers
 from surfsig.coordinate_system import CoordinateSystem, GeoKeys
@@ -46,7 +46,7 @@ from surfsig.odometry import Odometry, ScanStatus, estimate_odometry
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import EqualSurfaces, Piece, Recurrence, Recurrences, find_recurrences
 from surfsig.registration import Registration, register
-from surfsig.shapes import FittedShape, fit_cylinder, fit_plane, fit_sphere
+from surfsig.shapes import fit_cylinder, fit_plane, fit_sphere
 from surfsig.signature_similarity import flip_signatures, similarity, similarity_class, similarity_matrix
 from surfsig.surfaces import PointClass, Surface, Surfaces, find_surfaces
 from surfsig.units import unit_mismatch
@@ -61,7 +61,6 @@ __all__ = [
     "FieldSignatures",
     "FileFormatError",
     "FitUsed",
-    "FittedShape",
     "Frame",
     "FreeDirection",
     "GeoKeys",
@@ -77,6 +76,7 @@ __all__ = [
     "Recurrence",
     "Recurrences",
     "Registration",
+    "RegistrationSettings",
     "ScanSequence",
     "ScanStatus",
     "Status",

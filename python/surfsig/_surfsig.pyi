@@ -33,6 +33,7 @@ __all__ = [
     "fit_primitive",
     "free_directions",
     "match_fields",
+    "mean_neighbor_distances",
     "register",
     "voxel_representatives",
     "write_e57",
@@ -110,6 +111,7 @@ class RegistrationSettings:
         radius_share: float | None = None,
         keypoints: int | None = None,
         candidates_per_radius: float | None = None,
+        description_voxels_per_radius: float | None = None,
         voxels_per_radius: float | None = None,
         orientation_voxels_per_radius: float | None = None,
         consensus_max_distance: float | None = None,
@@ -134,6 +136,9 @@ class RegistrationSettings:
     @property
     def candidates_per_radius(self) -> float:
         """Candidates for keypoints along a patch's radius."""
+    @property
+    def description_voxels_per_radius(self) -> float:
+        """Voxels along a patch's radius, to which scans are thinned before their patches are described."""
     @property
     def voxels_per_radius(self) -> float:
         """Voxels along a patch's radius, to which scans are thinned before they are refined."""
@@ -192,6 +197,13 @@ def register(
 def free_directions(
     points: NDArray[np.float64], normals: NDArray[np.float64]
 ) -> list[tuple[Literal["rotation", "translation"], list[float] | None, list[float] | None]]: ...
+def mean_neighbor_distances(
+    points: NDArray[np.float64],
+    *,
+    count: int,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> NDArray[np.float64]: ...
 def consistent_directions(
     points: NDArray[np.float64], *, voxel: float, threads: int | None = None
 ) -> NDArray[np.float32]: ...

@@ -1,25 +1,30 @@
 """Cleaning a cloud before its surface is fitted: a box, fewer points, no stray ones.
 
 Voxels are grouped by NumPy, because fields go with the points, which the libraries' own functions drop.
-Nearest points come from small_gicp's k-d tree: MIT, a wheel below 1 MB without dependencies, and as fast as
-SciPy's (BSD, 140 MB installed); Open3D's (300 MB) takes longer than either.
 """
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfsig.arguments import MOST_NEIGHBORS, positive_length, thread_count, whole_number
-from surfsig.convert.libraries import library
+from surfsig import _surfsig
+from surfsig.arguments import (
+    MOST_NEIGHBORS,
+    positive_length,
+    progress_callback,
+    thread_count,
+    whole_number,
+)
 from surfsig.defaults import OUTLIER_NEIGHBORS, OUTLIER_STD_RATIO
 from surfsig.errors import InvalidInputError
 from surfsig.files.options import box_array, cropped
 from surfsig.missing_returns import remove_missing_returns
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress, ProgressCallback
+from surfsig.threads import map_in_threads
 
 LATTICE_LIMIT = 1 << 43
 """Voxels from 0 to a point along an axis, at most; as in the core's own voxels."""
@@ -27,8 +32,6 @@ LATTICE_LIMIT = 1 << 43
 COORDINATE_LIMIT = 1e150
 """Beyond, the square of a distance leaves float64."""
 
-_SEARCH_CELLS = 64
-_NEIGHBOURS_AT_A_TIME = 1 << 22
 _COLOURS = ("red", "green", "blue", "alpha")
 _NORMALS = ("nx", "ny", "nz")
 
@@ -56,7 +59,13 @@ def crop(cloud: PointCloud | ArrayLike, box: ArrayLike) -> PointCloud:
     return cropped(PointCloud.of(cloud), box_array(box))
 
 
-def downsample(cloud: PointCloud | ArrayLike, voxel: float) -> PointCloud:
+def downsample(
+    cloud: PointCloud | ArrayLike,
+    voxel: float,
+    *,
+    threads: int | None = None,
+    progress: ProgressCallback | None = None,
+) -> PointCloud:
     """Put the mean of its points into each voxel that has any, as PCL's VoxelGrid does.
 
     Parameters
@@ -66,6 +75,10 @@ def downsample(cloud: PointCloud | ArrayLike, voxel: float) -> PointCloud:
     voxel
         Edge of the voxels, in the cloud's unit. Their lattice is anchored at 0: the same voxels for every
         cloud in the same coordinates.
+    threads
+        Number of threads that columns are shared among; all cores by default. The result is the same.
+    progress
+        Called with the number of columns (x, y, z, fields that are averaged) done, and of all.
 
     Returns
     -------
@@ -81,6 +94,7 @@ def downsample(cloud: PointCloud | ArrayLike, voxel: float) -> PointCloud:
     """
     cloud = _finite_part(PointCloud.of(cloud))
     edge = positive_length(voxel, "voxel")
+    workers, tell = thread_count(threads), progress_callback(progress)
     if not len(cloud):
         return cloud
     # An axis a row: along the short axis of (n, 3), NumPy is several times slower.
@@ -97,19 +111,31 @@ def downsample(cloud: PointCloud | ArrayLike, voxel: float) -> PointCloud:
             result[:] = np.bincount(group, column) / counts
         return means
 
-    # About each voxel's first point, where sums lose nothing at large coordinates.
-    anchors = axes[:, first].astype(np.float64)
-    rows = zip(axes, anchors, strict=True)
-    offsets = np.column_stack([anchor + mean(axis - anchor[group]) for axis, anchor in rows])
-    averaged: dict[str, NDArray[Any]] = {}
-    for name, values in cloud.fields.items():
-        if values.dtype.kind == "f":
-            averaged[name] = mean(values).astype(values.dtype)
-        elif name in _COLOURS and values.dtype == np.uint8:
-            averaged[name] = np.round(mean(values)).astype(np.uint8)
+    def mean_of_axis(number: int) -> NDArray[Any]:
+        axis = axes[number]
+        # About each voxel's first point, where sums lose nothing at large coordinates.
+        anchor = axis[first].astype(np.float64)
+        return np.asarray((anchor + mean(axis - anchor[group])).astype(axis.dtype))
+
+    def mean_of_field(name: str) -> NDArray[Any]:
+        values, means = cloud.fields[name], mean(cloud.fields[name])
+        return (np.round(means) if values.dtype == np.uint8 else means).astype(values.dtype)
+
+    names = [
+        name
+        for name, values in cloud.fields.items()
+        if values.dtype.kind == "f" or (name in _COLOURS and values.dtype == np.uint8)
+    ]
+    done = Progress(tell, 3 + len(names))
+
+    def column_done(_number: int, _columns: int) -> None:
+        done.advance(1)
+
+    offsets = map_in_threads(mean_of_axis, range(3), workers, column_done)
+    fields = dict(zip(names, map_in_threads(mean_of_field, names, workers, column_done), strict=True))
     result = cloud.at(first)
-    result.offsets = offsets.astype(cloud.offsets.dtype)
-    result.fields |= averaged | _unit_normals(averaged)
+    result.offsets = np.column_stack(offsets)
+    result.fields |= fields | _unit_normals(fields)
     return result
 
 
@@ -119,6 +145,7 @@ def remove_outliers(
     std_ratio: float = OUTLIER_STD_RATIO,
     *,
     threads: int | None = None,
+    progress: ProgressCallback | None = None,
 ) -> PointCloud:
     """Drop stray points, as PCL's StatisticalOutlierRemoval does.
 
@@ -137,6 +164,8 @@ def remove_outliers(
         Standard deviations, at least 0: the smaller, the more points go.
     threads
         Number of threads; all cores by default. The result is the same.
+    progress
+        Called with the number of points whose neighbours have been found, and of all.
 
     Returns
     -------
@@ -146,7 +175,7 @@ def remove_outliers(
     Raises
     ------
     InvalidInputError
-        If an argument has no meaning, or small_gicp is not installed.
+        If an argument has no meaning.
     """
     neighbors = whole_number(neighbors, "neighbors", MOST_NEIGHBORS)
     try:
@@ -156,43 +185,18 @@ def remove_outliers(
     if not 0 <= ratio < np.inf:
         raise InvalidInputError(f"std_ratio must be a finite number from 0 on, not {ratio:g}")
     cloud = _finite_part(remove_missing_returns(cloud))
-    workers = thread_count(threads) or os.cpu_count() or 1
+    workers, tell = thread_count(threads), progress_callback(progress)
     # With two points, both are as far from their nearest: there is nothing to compare.
     if len(cloud) < 3:
         return cloud
     if float(np.abs(cloud.offsets).max()) > COORDINATE_LIMIT:
         raise InvalidInputError(f"coordinates must be within {COORDINATE_LIMIT:g} to measure distances")
-    distances = _neighbour_distances(cloud.offsets, min(neighbors, len(cloud) - 1), workers)
+    points = np.ascontiguousarray(cloud.offsets, np.float64)
+    count = min(neighbors, len(cloud) - 1)
+    distances = _surfsig.mean_neighbor_distances(points, count=count, threads=workers, progress=tell)
     limit = distances.mean() + ratio * distances.std(ddof=1)
     stays = distances <= limit
     return cloud if stays.all() else cloud.at(np.flatnonzero(stays))
-
-
-def _neighbour_distances(offsets: NDArray[Any], neighbors: int, workers: int) -> NDArray[np.float64]:
-    """Give each point's mean distance to its nearest others, (n,)."""
-    small_gicp = library("small_gicp", "small_gicp", "'surfsig[clean]'")
-    order = _nearby_in_turn(offsets)
-    points = offsets[order].astype(np.float64)
-    tree = small_gicp.KdTree(points, num_threads=workers)
-    means = np.empty(len(points))
-    block = max(1, _NEIGHBOURS_AT_A_TIME // neighbors)
-    for start in range(0, len(points), block):
-        rows = slice(start, start + block)
-        # The nearest of all is the point itself, or one in the same place.
-        _, squares = tree.batch_knn_search(points[rows], neighbors + 1, num_threads=workers)
-        means[order[rows]] = np.sqrt(np.asarray(squares)[:, 1:]).mean(axis=1)
-    return means
-
-
-def _nearby_in_turn(offsets: NDArray[Any]) -> NDArray[np.int64]:
-    """Order points by cells, so that searches one after the other find their part of the tree in the cache.
-
-    Points in random order take three times as long.
-    """
-    lowest = offsets.min(axis=0).astype(np.float64)
-    extent = float((offsets.max(axis=0) - lowest).max()) or 1.0
-    cells = ((offsets - lowest) / extent * _SEARCH_CELLS).astype(np.int64)
-    return np.argsort((cells @ [1 << 16, 1 << 8, 1]).astype(np.uint32), kind="stable")
 
 
 def _finite_part(cloud: PointCloud) -> PointCloud:

@@ -5,6 +5,7 @@ mod e57;
 mod extract;
 mod field;
 mod frame;
+mod neighbor_distances;
 mod odometry;
 mod primitive;
 mod python_file;
@@ -65,6 +66,8 @@ mod _surfsig {
     use crate::field::{field_keypoints, field_signatures, match_fields};
     #[pymodule_export]
     use crate::frame::Frame;
+    #[pymodule_export]
+    use crate::neighbor_distances::mean_neighbor_distances;
     #[pymodule_export]
     use crate::odometry::Odometry;
     #[pymodule_export]

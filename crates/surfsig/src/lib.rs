@@ -48,6 +48,7 @@ mod lattice;
 mod members;
 mod moments;
 mod monitor;
+mod neighbor_distances;
 mod odometry;
 mod orientation;
 mod point_cloud;
@@ -91,6 +92,7 @@ pub use geometry::{RigidTransform, TransformError};
 pub use kd_tree::KdTree;
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use monitor::Monitor;
+pub use neighbor_distances::mean_neighbor_distances;
 pub use odometry::{
     ExpectationSettings, MapSettings, Odometry, OdometrySettings, PredictionSettings, RelocalisationSettings,
     ScaleSettings, ScanAlignmentSettings, ScanPose, ScanStatus,
