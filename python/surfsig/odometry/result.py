@@ -70,5 +70,5 @@ class Odometry:
     @property
     def length(self) -> float:
         """Length of the trajectory, in the scans' unit: straight lines between the scans that have a pose."""
-        places = self.poses[np.isfinite(self.poses).all(axis=(1, 2)), :3, 3]
-        return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+        positions = self.poses[np.isfinite(self.poses).all(axis=(1, 2)), :3, 3]
+        return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
