@@ -76,6 +76,14 @@ pub struct Odometry {
     tracked: Option<Tracked>,
 }
 
+impl std::fmt::Debug for Odometry {
+    /// Without the map, which is long.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut told = f.debug_struct("Odometry");
+        told.field("scans", &self.poses.len()).field("voxel", &self.voxel()).finish_non_exhaustive()
+    }
+}
+
 /// What there is from the first scan on that has a pose.
 struct Tracked {
     /// Its number.
