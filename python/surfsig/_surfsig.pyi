@@ -13,10 +13,12 @@ __all__ = [
     "INSTRUCTION_SET",
     "KIND_PARAMETERS",
     "OPTIMAL",
+    "SCAN_STATUS_NAMES",
     "STATUS_NAMES",
     "DepthImage",
     "E57Reader",
     "Frame",
+    "Odometry",
     "Primitive",
     "RegistrationSettings",
     "SurfaceIndex",
@@ -43,6 +45,7 @@ _Places = tuple[
 ]
 
 __version__: str
+SCAN_STATUS_NAMES: list[str]
 STATUS_NAMES: list[str]
 KIND_PARAMETERS: dict[str, int]
 FEWEST_SURFACE_POINTS: int
@@ -307,6 +310,28 @@ class Frame:
     def signatures_of_surfaces(
         self, surfaces: NDArray[np.float32], *, side: float
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]: ...
+
+@final
+class Odometry:
+    def __new__(
+        cls,
+        *,
+        voxel: float | None = None,
+        max_correspondence_distance: float | None = None,
+        map_range: float | None = None,
+        threads: int | None = None,
+    ) -> Odometry: ...
+    def push(
+        self,
+        points: NDArray[np.floating],
+        *,
+        origin: Sequence[float],
+        viewpoint: Sequence[float] | None = None,
+    ) -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def voxel(self) -> float | None: ...
+    def arrays(self) -> dict[str, NDArray[Any]]: ...
 
 @final
 class Primitive:

@@ -49,6 +49,7 @@ mod members;
 mod moments;
 mod monitor;
 mod neighbor_distances;
+mod odometry;
 mod orientation;
 mod point_cloud;
 mod primitive;
@@ -63,6 +64,7 @@ mod surface_index;
 mod surfaces;
 mod tensor;
 mod threads;
+mod visibility;
 mod voxels;
 
 pub use alignment::{
@@ -91,6 +93,10 @@ pub use kd_tree::KdTree;
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use monitor::Monitor;
 pub use neighbor_distances::mean_neighbor_distances;
+pub use odometry::{
+    ExpectationSettings, MapSettings, Odometry, OdometrySettings, PredictionSettings, RelocalisationSettings,
+    ScaleSettings, ScanAlignmentSettings, ScanPose, ScanStatus,
+};
 pub use orientation::consistent_directions;
 pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
@@ -103,4 +109,5 @@ pub use status::Status;
 pub use surface_index::SurfaceIndex;
 pub use surfaces::{FEWEST_SURFACE_POINTS, FoundSurface, FoundSurfaces, SurfaceOptions, find_surfaces};
 pub use threads::with_threads;
+pub use visibility::{RangeImageSettings, SphericalRangeImage, Visibility};
 pub use voxels::voxel_means;
