@@ -181,7 +181,7 @@ class RegistrationSettings:
     @property
     def trusted_overlap_of_start(self) -> float:
         """Overlap from which on a transform is trusted that the caller gave roughly."""
-    def __eq__(self, other: object) -> bool: ...
+    def __eq__(self, value: object, /) -> bool: ...
 
 def register(
     source: _Scan,
