@@ -1,4 +1,4 @@
-# The way in: `make demo` shows the method at work, `make test` proves it. Both set up all they need in .venv.
+# The way in: `make demo` shows the method at work, `make test` tests it. Both set up all they need in .venv.
 
 PYTHON ?= python3
 VENV   := .venv
@@ -10,7 +10,7 @@ PREFIX ?= /usr/local
 # What the compiled module is made from; a change of any rebuilds it.
 SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -name '*.bin' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help demo test lint format bench bench-reading bench-error bench-segmentation bench-registration bench-finding bench-odometry fuzz docs tour wheel check-wheel header install-c clean build
+.PHONY: help demo test test-all lint format bench bench-reading bench-error bench-segmentation bench-registration bench-finding bench-odometry fuzz docs tour wheel check-wheel header install-c clean build
 .DEFAULT_GOAL := help
 
 help: ## Say what there is to make
@@ -20,9 +20,13 @@ demo: build ## Run the main job and draw it into demo/
 	$(BIN)/python examples/demo.py $(OUT)
 	$(BIN)/surfsig paper --out $(OUT)/paper
 
-test: build ## Run all tests: Rust, its doc examples, Python
+test: build ## Run the quick tests: Rust, its doc examples, Python without the slow ones
 	cargo test --workspace --quiet
 	$(BIN)/python -m pytest
+
+test-all: build ## Run all tests, the slow ones too
+	cargo test --workspace --quiet
+	$(BIN)/python -m pytest -m ""
 
 lint: build ## Formatters, linters and type checkers
 	cargo fmt --all --check
@@ -65,7 +69,7 @@ fuzz: build ## Read damaged files of all formats: make fuzz COUNT=100000
 docs: build ## Build the API reference: target/doc (Rust) and build/docs (Python, the C headers)
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 	$(BIN)/python -W error -m pdoc --docformat numpy --output-directory build/docs surfsig
-	cp crates/surfsig-c/include/surfsig.h crates/surfsig-c/include/surfsig.hpp build/docs
+	cp crates/surfsig-c/include/*.h crates/surfsig-c/include/*.hpp build/docs
 
 tour: build ## Run the code of docs/tour.md, and draw its pictures
 	$(BIN)/python examples/tour.py

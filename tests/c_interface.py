@@ -11,6 +11,7 @@ from ctypes import (
     POINTER,
     Structure,
     byref,
+    c_bool,
     c_char_p,
     c_double,
     c_float,
@@ -85,6 +86,37 @@ class Transform(Structure):
         return np.array(self.matrix[:]).reshape(4, 4)
 
 
+class Scan(Structure):
+    """A surfsig_scan."""
+
+    _fields_ = (("cloud", c_void_p), ("viewpoint", c_void_p), ("directions", c_void_p))
+
+
+class FreeDirection(Structure):
+    """A surfsig_free_direction."""
+
+    _fields_ = (("axis", c_double * 3), ("point", c_double * 3))
+
+
+class Registration(Structure):
+    """A surfsig_registration."""
+
+    _fields_ = (
+        ("found", c_bool),
+        ("trusted", c_bool),
+        ("T_target_source", Transform),
+        ("covariance", c_double * 36),
+        ("center", c_double * 3),
+        ("free_direction_count", c_size_t),
+        ("free_directions", FreeDirection * 6),
+        ("matches", c_size_t),
+        ("inliers", c_size_t),
+        ("overlap", c_double),
+        ("rms", c_double),
+        ("radius", c_double),
+    )
+
+
 @dataclass
 class Options:
     """What the setters are called with."""
@@ -116,7 +148,7 @@ class CInterface:
         self.functions = f = ctypes.CDLL(str(self.library))
         for name in ("version", "last_error", "status_name", "surface_kind_name"):
             getattr(f, f"surfsig_{name}").restype = c_char_p
-        for name in ("options_new", "surface_options_new"):
+        for name in ("options_new", "surface_options_new", "registration_options_new"):
             getattr(f, f"surfsig_{name}").restype = c_void_p
         sizes = ("cloud_size", "extraction_size", "surfaces_size", "surfaces_label_count")
         for name in (*sizes, "surface_kind_parameters"):

@@ -17,6 +17,17 @@ from numpy.typing import NDArray
 from surfsig.files import write
 from surfsig.point_cloud import PointCloud
 
+SLOW_FIXTURES = {"installed": "compiles the C interface in release"}
+"""Fixtures that take minutes, and why: a test that uses one is slow."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests that use slow fixtures, before those that are marked are left out."""
+    for item in items:
+        if SLOW_FIXTURES.keys() & set(getattr(item, "fixturenames", ())):
+            item.add_marker(pytest.mark.slow)
+
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:

@@ -186,6 +186,9 @@ def test_the_examples(installed: Path, tmp_path: Path, target: str) -> None:
     # Seen from (1, 0, 0) against x: 1 - 0.6 in front.
     assert [float(number) for number in seen[2:]] == pytest.approx([0.4, 0, 0.2], abs=1e-3)
 
+    said, *_ = run(build / "registration").splitlines()
+    assert said.startswith("trusted, overlap 0.")
+
 
 def test_the_makefile_installs_where_it_is_told(tmp_path: Path, installed: Path) -> None:
     run("make", "-C", ROOT, "install-c", f"PREFIX={tmp_path}")

@@ -162,6 +162,7 @@ def test_outliers_are_those_of_open3d() -> None:
         assert result.fields["number"].tolist() == list(stays)
 
 
+@pytest.mark.slow
 def test_outliers_do_not_depend_on_threads_or_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("small_gicp")
     cloud = PointCloud(scan(), fields={"number": np.arange(3030)})

@@ -62,6 +62,7 @@ def test_the_command_of_the_readme(scan: Path, shell: Callable[..., Finished]) -
     assert found.fields["zeta"][middle] == pytest.approx(1, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_demo(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     lines = run(EXAMPLES / "demo.py", tmp_path)
@@ -72,11 +73,13 @@ def test_demo(tmp_path: Path) -> None:
     assert {"k1", "zeta", "nx"} <= surfsig.read(tmp_path / "part.ply").fields.keys()
 
 
+@pytest.mark.slow
 def test_neighbours() -> None:
     lines = run(EXAMPLES / "neighbours.py")
     assert [line.partition(":")[0] for line in lines[1:]] == ["cleaning", "Open3D", "pandas", "Arrow"]
 
 
+@pytest.mark.slow
 def test_real_scans(shared_data: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     picture = tmp_path / "scans.png"
@@ -85,6 +88,7 @@ def test_real_scans(shared_data: Path, tmp_path: Path) -> None:
     assert picture.stat().st_size > 50_000
 
 
+@pytest.mark.slow
 def test_surfaces(shared_data: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     picture = tmp_path / "surfaces.png"
@@ -94,6 +98,7 @@ def test_surfaces(shared_data: Path, tmp_path: Path) -> None:
     assert picture.stat().st_size > 30_000
 
 
+@pytest.mark.slow
 def test_find_again(shared_data: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     pytest.importorskip("small_gicp")
@@ -104,6 +109,7 @@ def test_find_again(shared_data: Path, tmp_path: Path) -> None:
     assert picture.stat().st_size > 50_000
 
 
+@pytest.mark.slow
 def test_real_classes(shared_data: Path, tmp_path: Path) -> None:
     """The table of docs/zeta.md: right decisions, in percent, without a flat atom and with either length."""
     pytest.importorskip("matplotlib")

@@ -18,6 +18,7 @@ def five() -> surfsig.Instances:
     return surfsig.find_instances(whole("figure"), finding_scene("figure", 1).cloud)
 
 
+@pytest.mark.slow
 def test_five_half_hidden_copies_are_all_found_and_nothing_else(five: surfsig.Instances) -> None:
     scene = finding_scene("figure", 1)
     assert (scene.hidden > 0.45).all()
@@ -32,6 +33,7 @@ def test_five_half_hidden_copies_are_all_found_and_nothing_else(five: surfsig.In
         assert np.linalg.eigvalsh(instance.covariance).min() > 0.0
 
 
+@pytest.mark.slow
 def test_instances_say_the_same_in_every_form(five: surfsig.Instances) -> None:
     frame, values = five.to_pandas(), five.values()["instances"]
     header, rows = five.table()
@@ -43,6 +45,7 @@ def test_instances_say_the_same_in_every_form(five: surfsig.Instances) -> None:
         assert (five.labels == number).sum() == len(instance.indices) == values[number]["points"]
 
 
+@pytest.mark.slow
 def test_what_is_not_there_is_not_found() -> None:
     found = surfsig.find_instances(whole("figure"), finding_scene("figure", 1, copies=0, others=6).cloud)
     assert len(found) == 0
@@ -50,6 +53,7 @@ def test_what_is_not_there_is_not_found() -> None:
     assert (found.labels == -1).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "model", "truth"),
     [
@@ -70,6 +74,7 @@ def test_real_objects_are_found_once_each(shared_data: Path, name: str, model: s
     assert turn < 2.0
 
 
+@pytest.mark.slow
 def test_real_objects_are_not_found_in_each_others_scene(shared_data: Path) -> None:
     objects = shared_data / "objects"
     for name, other in (("milk", "chef"), ("chef", "milk")):
@@ -77,17 +82,20 @@ def test_real_objects_are_not_found_in_each_others_scene(shared_data: Path) -> N
         assert len(surfsig.find_instances(model, surfsig.read(objects / other / "scene.pcd"))) == 0
 
 
+@pytest.mark.slow
 def test_clutter_is_no_model(shared_data: Path) -> None:
     room = surfsig.read(shared_data / "registration" / "redkitchen" / "cloud_bin_0.ply")
     assert len(surfsig.find_instances(surfsig.PointCloud(3.0 * whole("figure").points), room)) == 0
 
 
+@pytest.mark.slow
 def test_a_box_is_no_bracket() -> None:
     # Where the bracket's faces end, those of a larger box go on.
     scene = finding_scene("bracket with pin", 3, copies=0, others=9)
     assert len(surfsig.find_instances(whole("bracket with pin"), scene.cloud)) == 0
 
 
+@pytest.mark.slow
 def test_poses_from_noisy_scans_are_as_sure_as_they_say() -> None:
     scene = finding_scene("figure", 1, copies=3, others=0, noise=1e-3)
     found = surfsig.find_instances(whole("figure"), scene.cloud)
@@ -101,6 +109,7 @@ def test_poses_from_noisy_scans_are_as_sure_as_they_say() -> None:
         assert motion @ np.linalg.solve(instance.covariance, motion) < 22.5
 
 
+@pytest.mark.slow
 def test_any_number_of_threads_finds_the_same(five: surfsig.Instances) -> None:
     alone = surfsig.find_instances(whole("figure"), finding_scene("figure", 1).cloud, threads=1)
     for one, other in zip(alone.instances, five.instances, strict=True):
@@ -108,6 +117,7 @@ def test_any_number_of_threads_finds_the_same(five: surfsig.Instances) -> None:
         np.testing.assert_array_equal(one.T_scene_model, other.T_scene_model)
 
 
+@pytest.mark.slow
 def test_far_away_coordinates_change_nothing() -> None:
     scene, far = finding_scene("figure", 2, copies=1, others=1), np.array([5e5, 5e6, 100.0])
     moved = surfsig.PointCloud(scene.cloud.offsets, origin=far, viewpoint=far)
@@ -118,12 +128,14 @@ def test_far_away_coordinates_change_nothing() -> None:
     assert errors(pose, scene.poses[0])[0] < 0.001
 
 
+@pytest.mark.slow
 def test_a_scene_in_its_sensor_s_axes_needs_no_viewpoint(five: surfsig.Instances) -> None:
     scene = finding_scene("figure", 1)
     found = surfsig.find_instances(whole("figure"), surfsig.PointCloud(scene.cloud.offsets))
     assert [instance.score for instance in found.instances] == [instance.score for instance in five.instances]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_halves_of_copies_around_the_origin_are_all_found(seed: int) -> None:
     # Nobody saw that from the origin, which is in its midst, though few points hide others.
@@ -150,6 +162,7 @@ def test_a_closed_surface_is_not_seen_from_one_place() -> None:
     assert seen_from(eye, ball[ball[:, 2] > 0.3], 0.02)
 
 
+@pytest.mark.slow
 def test_points_a_million_metres_away_change_nothing() -> None:
     scene, far = finding_scene("figure", 2, copies=1, others=1), [[1e6, -2e6, 1e6]]
     model = surfsig.PointCloud(np.concatenate([whole("figure").points, far]))

@@ -82,6 +82,7 @@ def test_clouds_without_surface_have_an_answer_or_a_reason(name: str, points: An
             assert FUNCTIONS[name](points) is not None
 
 
+@pytest.mark.slow
 def test_nothing_but_our_own_lines_reaches_stderr(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     from surfsig.cli import run
 

@@ -12,6 +12,7 @@ MUTATE = Path(__file__).parents[1] / "fuzz" / "mutate.py"
 SEED = 7
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="the console's encoding has no table lines")
 def test_two_thousand_damaged_files_are_read_or_refused() -> None:
     pytest.importorskip("pyarrow")

@@ -72,6 +72,7 @@ def test_a_damaged_model_is_said(path: Path, change: str) -> None:
         Library(path).get("figure")
 
 
+@pytest.mark.slow
 def test_the_commands_do_all_of_it(tmp_path: Path, shell: Any) -> None:
     scene = finding_scene("figure", 2, copies=1, others=1)
     model, scan, store = (tmp_path / name for name in ("figure.ply", "scene.ply", "things.db"))

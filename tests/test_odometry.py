@@ -45,6 +45,7 @@ def found(walk: Walk) -> Odometry:
     return surfsig.estimate_odometry(walk.scans)
 
 
+@pytest.mark.slow
 def test_drift_is_below_two_thousandths_of_the_way(found: Odometry, walk: Walk) -> None:
     assert found.counts() == {"tracked": 42, "relocalised": 0, "lost": 0, "too_few_points": 0}
     off, turned = moving_sensor.errors(found.poses, walk.true)
@@ -56,6 +57,7 @@ def test_drift_is_below_two_thousandths_of_the_way(found: Odometry, walk: Walk) 
     np.testing.assert_array_equal(found.timestamps, np.arange(42))
 
 
+@pytest.mark.slow
 def test_covariances_are_as_large_as_the_errors(found: Odometry, walk: Walk) -> None:
     motions = moving_sensor.missing_motions(found.poses, walk.true)[1:]
     nees = np.einsum("ni,nij,nj->n", motions, np.linalg.inv(found.covariances[1:]), motions)
@@ -68,6 +70,7 @@ def test_covariances_are_as_large_as_the_errors(found: Odometry, walk: Walk) -> 
     assert sizes[-8:].mean() > 2 * sizes[1:9].mean()
 
 
+@pytest.mark.slow
 def test_a_sensor_that_was_carried_away_is_found_again(walk: Walk) -> None:
     carried = [*range(0, 32, 2), 5, 7]
     result = surfsig.estimate_odometry([walk.scans[number] for number in carried])
@@ -77,6 +80,7 @@ def test_a_sensor_that_was_carried_away_is_found_again(walk: Walk) -> None:
     assert np.degrees(turned.max()) < 0.2
 
 
+@pytest.mark.slow
 def test_what_no_scan_alone_is_sure_of_waits_for_the_next_ones(
     walk: Walk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -92,6 +96,7 @@ def test_what_no_scan_alone_is_sure_of_waits_for_the_next_ones(
     assert surfsig.estimate_odometry(scans[:-1]).status.tolist() == [0] * 9 + [ScanStatus.LOST] * 2
 
 
+@pytest.mark.slow
 def test_a_building_with_the_same_walls_was_taken_for_the_mapped_one(walk: Walk) -> None:
     other = moving_sensor.building(100)
     away = [moving_sensor.scan(other, walk.true[number], 1000 + number) for number in (3, 4, 12)]
@@ -99,6 +104,7 @@ def test_a_building_with_the_same_walls_was_taken_for_the_mapped_one(walk: Walk)
     assert result.status.tolist() == [0] * 10 + [ScanStatus.LOST] * 3
 
 
+@pytest.mark.slow
 def test_a_fast_sensor_was_lost_for_good_after_two_scans_of_noise(walk: Walk) -> None:
     """It is looked for where its motion brought it meanwhile, beyond the map's rim."""
     scans, true = walk.scans[:41:4], walk.true[:41:4]
@@ -110,6 +116,7 @@ def test_a_fast_sensor_was_lost_for_good_after_two_scans_of_noise(walk: Walk) ->
     assert np.nanmax(off) < 0.02
 
 
+@pytest.mark.slow
 def test_something_that_moves_before_the_sensor_does_not_end_the_way(walk: Walk) -> None:
     """A column 0.6 m wide crosses the room 1.5 m ahead."""
     scans = list(walk.scans[:16])
@@ -176,6 +183,7 @@ def test_only_empty_scans() -> None:
     assert result.length == 0
 
 
+@pytest.mark.slow
 def test_the_same_for_any_number_of_threads(walk: Walk) -> None:
     scans = [*walk.scans[:12:3], walk.scans[1]]
     first, second = (surfsig.estimate_odometry(scans, threads=threads) for threads in (1, 2))

@@ -42,6 +42,7 @@ def test_two_scans_that_overlap_by_half(parts: tuple[PointCloud, PointCloud, np.
     assert 24 <= found.inliers <= found.matches
 
 
+@pytest.mark.slow
 def test_nobody_knows_where_the_sensors_stood(parts: tuple[PointCloud, PointCloud, np.ndarray]) -> None:
     source, target, truth = parts
     check(surfsig.register(source.offsets, target.offsets), truth)
@@ -82,6 +83,7 @@ def test_a_start_is_refined(parts: tuple[PointCloud, PointCloud, np.ndarray]) ->
     assert (found.matches, found.inliers) == (0, 0)
 
 
+@pytest.mark.slow
 def test_covariances_are_those_of_many_draws() -> None:
     """The mean squared error in units of the covariance is that of six numbers."""
     squares = []
@@ -175,6 +177,7 @@ def test_a_cloud_is_moved_with_its_viewpoint_and_normals(
     assert there.fields["intensity"].tolist() == [0, 1, 2, 3, 4]
 
 
+@pytest.mark.slow
 def test_fragments_of_a_kitchen(shared_data: Path) -> None:
     """Two that overlap by a fifth, each in the axes of its own camera."""
     folder = shared_data / "registration" / "redkitchen"

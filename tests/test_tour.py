@@ -18,6 +18,7 @@ NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")
 KIBIBYTES_150 = 150 * 1024
 
 
+@pytest.mark.slow
 def test_the_code_prints_what_the_tour_quotes_and_is_drawn(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -61,6 +61,7 @@ def test_scans_of_one_unit_are_not_said_to_differ() -> None:
     assert surfsig.unit_mismatch(source, np.zeros((5, 3))) is None
 
 
+@pytest.mark.slow
 def test_finding_names_the_units() -> None:
     scene, model = finding_scene("figure", 2, copies=1, others=1).cloud, whole("figure")
     larger = PointCloud(model.points * 1000.0)

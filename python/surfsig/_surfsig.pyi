@@ -107,6 +107,7 @@ class RegistrationSettings:
         radius_share: float | None = None,
         keypoints: int | None = None,
         candidates_per_radius: float | None = None,
+        description_voxels_per_radius: float | None = None,
         voxels_per_radius: float | None = None,
         orientation_voxels_per_radius: float | None = None,
         consensus_max_distance: float | None = None,
@@ -131,6 +132,9 @@ class RegistrationSettings:
     @property
     def candidates_per_radius(self) -> float:
         """Candidates for keypoints along a patch's radius."""
+    @property
+    def description_voxels_per_radius(self) -> float:
+        """Voxels along a patch's radius, to which scans are thinned before their patches are described."""
     @property
     def voxels_per_radius(self) -> float:
         """Voxels along a patch's radius, to which scans are thinned before they are refined."""

@@ -13,13 +13,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfsig.arguments import MOST_NEIGHBORS, positive_length, thread_count, whole_number
+from surfsig.arguments import (
+    MOST_NEIGHBORS,
+    positive_length,
+    progress_callback,
+    thread_count,
+    whole_number,
+)
 from surfsig.convert.libraries import library
 from surfsig.defaults import OUTLIER_NEIGHBORS, OUTLIER_STD_RATIO
 from surfsig.errors import InvalidInputError
 from surfsig.files.options import box_array, cropped
 from surfsig.missing_returns import remove_missing_returns
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress, ProgressCallback
+from surfsig.threads import map_in_threads
 
 LATTICE_LIMIT = 1 << 43
 """Voxels from 0 to a point along an axis, at most; as in the core's own voxels."""
@@ -56,7 +64,13 @@ def crop(cloud: PointCloud | ArrayLike, box: ArrayLike) -> PointCloud:
     return cropped(PointCloud.of(cloud), box_array(box))
 
 
-def downsample(cloud: PointCloud | ArrayLike, voxel: float) -> PointCloud:
+def downsample(
+    cloud: PointCloud | ArrayLike,
+    voxel: float,
+    *,
+    threads: int | None = None,
+    progress: ProgressCallback | None = None,
+) -> PointCloud:
     """Put the mean of its points into each voxel that has any, as PCL's VoxelGrid does.
 
     Parameters
@@ -66,6 +80,10 @@ def downsample(cloud: PointCloud | ArrayLike, voxel: float) -> PointCloud:
     voxel
         Edge of the voxels, in the cloud's unit. Their lattice is anchored at 0: the same voxels for every
         cloud in the same coordinates.
+    threads
+        Number of threads that columns are shared among; all cores by default. The result is the same.
+    progress
+        Called with the number of columns (x, y, z, fields that are averaged) done, and of all.
 
     Returns
     -------
@@ -81,6 +99,7 @@ def downsample(cloud: PointCloud | ArrayLike, voxel: float) -> PointCloud:
     """
     cloud = _finite_part(PointCloud.of(cloud))
     edge = positive_length(voxel, "voxel")
+    workers, tell = thread_count(threads), progress_callback(progress)
     if not len(cloud):
         return cloud
     # An axis a row: along the short axis of (n, 3), NumPy is several times slower.
@@ -97,19 +116,31 @@ def downsample(cloud: PointCloud | ArrayLike, voxel: float) -> PointCloud:
             result[:] = np.bincount(group, column) / counts
         return means
 
-    # About each voxel's first point, where sums lose nothing at large coordinates.
-    anchors = axes[:, first].astype(np.float64)
-    rows = zip(axes, anchors, strict=True)
-    offsets = np.column_stack([anchor + mean(axis - anchor[group]) for axis, anchor in rows])
-    averaged: dict[str, NDArray[Any]] = {}
-    for name, values in cloud.fields.items():
-        if values.dtype.kind == "f":
-            averaged[name] = mean(values).astype(values.dtype)
-        elif name in _COLOURS and values.dtype == np.uint8:
-            averaged[name] = np.round(mean(values)).astype(np.uint8)
+    def mean_of_axis(number: int) -> NDArray[Any]:
+        axis = axes[number]
+        # About each voxel's first point, where sums lose nothing at large coordinates.
+        anchor = axis[first].astype(np.float64)
+        return np.asarray((anchor + mean(axis - anchor[group])).astype(axis.dtype))
+
+    def mean_of_field(name: str) -> NDArray[Any]:
+        values, means = cloud.fields[name], mean(cloud.fields[name])
+        return (np.round(means) if values.dtype == np.uint8 else means).astype(values.dtype)
+
+    names = [
+        name
+        for name, values in cloud.fields.items()
+        if values.dtype.kind == "f" or (name in _COLOURS and values.dtype == np.uint8)
+    ]
+    done = Progress(tell, 3 + len(names))
+
+    def column_done(_number: int, _columns: int) -> None:
+        done.advance(1)
+
+    offsets = map_in_threads(mean_of_axis, range(3), workers, column_done)
+    fields = dict(zip(names, map_in_threads(mean_of_field, names, workers, column_done), strict=True))
     result = cloud.at(first)
-    result.offsets = offsets.astype(cloud.offsets.dtype)
-    result.fields |= averaged | _unit_normals(averaged)
+    result.offsets = np.column_stack(offsets)
+    result.fields |= fields | _unit_normals(fields)
     return result
 
 
@@ -119,6 +150,7 @@ def remove_outliers(
     std_ratio: float = OUTLIER_STD_RATIO,
     *,
     threads: int | None = None,
+    progress: ProgressCallback | None = None,
 ) -> PointCloud:
     """Drop stray points, as PCL's StatisticalOutlierRemoval does.
 
@@ -137,6 +169,8 @@ def remove_outliers(
         Standard deviations, at least 0: the smaller, the more points go.
     threads
         Number of threads; all cores by default. The result is the same.
+    progress
+        Called with the number of points whose neighbours have been found, and of all.
 
     Returns
     -------
@@ -157,18 +191,21 @@ def remove_outliers(
         raise InvalidInputError(f"std_ratio must be a finite number from 0 on, not {ratio:g}")
     cloud = _finite_part(remove_missing_returns(cloud))
     workers = thread_count(threads) or os.cpu_count() or 1
+    done = Progress(progress_callback(progress), len(cloud))
     # With two points, both are as far from their nearest: there is nothing to compare.
     if len(cloud) < 3:
         return cloud
     if float(np.abs(cloud.offsets).max()) > COORDINATE_LIMIT:
         raise InvalidInputError(f"coordinates must be within {COORDINATE_LIMIT:g} to measure distances")
-    distances = _neighbour_distances(cloud.offsets, min(neighbors, len(cloud) - 1), workers)
+    distances = _neighbour_distances(cloud.offsets, min(neighbors, len(cloud) - 1), workers, done)
     limit = distances.mean() + ratio * distances.std(ddof=1)
     stays = distances <= limit
     return cloud if stays.all() else cloud.at(np.flatnonzero(stays))
 
 
-def _neighbour_distances(offsets: NDArray[Any], neighbors: int, workers: int) -> NDArray[np.float64]:
+def _neighbour_distances(
+    offsets: NDArray[Any], neighbors: int, workers: int, done: Progress
+) -> NDArray[np.float64]:
     """Give each point's mean distance to its nearest others, (n,)."""
     small_gicp = library("small_gicp", "small_gicp", "'surfsig[clean]'")
     order = _nearby_in_turn(offsets)
@@ -181,6 +218,7 @@ def _neighbour_distances(offsets: NDArray[Any], neighbors: int, workers: int) ->
         # The nearest of all is the point itself, or one in the same place.
         _, squares = tree.batch_knn_search(points[rows], neighbors + 1, num_threads=workers)
         means[order[rows]] = np.sqrt(np.asarray(squares)[:, 1:]).mean(axis=1)
+        done.advance(len(points[rows]))
     return means
 
 

@@ -14,6 +14,7 @@ from surfsig import _surfsig
 from surfsig.arguments import (
     MOST_NEIGHBORS,
     positive_length,
+    progress_callback,
     thread_count,
     whole_number,
 )
@@ -209,7 +210,7 @@ class _Job:
             directions=directions,
             robust=self.robust,
             threads=thread_count(self.threads),
-            progress=self.progress,
+            progress=progress_callback(self.progress),
         )
         sizes = radius if isinstance(radius, Sequence) and not isinstance(radius, str) else [radius]
         counts = [int((arrays["status"] == Status.TOO_COARSE).sum()) for arrays in found]

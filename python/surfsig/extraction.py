@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfsig._surfsig import Frame
-from surfsig.arguments import (
-    place_numbers,
-)
+from surfsig.arguments import progress_callback
 from surfsig.defaults import SIGNATURE_BLOCK, Axes
 from surfsig.errors import InvalidInputError
 from surfsig.flat_atom import flat_atom_length
+from surfsig.places import place_numbers
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import ProgressCallback
 from surfsig.signature_similarity import SIGNATURE, similarity
 
 if TYPE_CHECKING:
@@ -356,7 +356,13 @@ class Extraction:
             )
             yield places, rows, status
 
-    def similarity_to(self, signature: ArrayLike, *, frame: Frame | None = None) -> FloatArray:
+    def similarity_to(
+        self,
+        signature: ArrayLike,
+        *,
+        frame: Frame | None = None,
+        progress: ProgressCallback | None = None,
+    ) -> FloatArray:
         """Compare every place with one signature, to see where else its surface is.
 
         Parameters
@@ -366,6 +372,8 @@ class Extraction:
             at the same radius, in the same axes, and with the same frame.
         frame
             The vocabulary; `Frame.default()` by default.
+        progress
+            Called with the number of places compared, and of all.
 
         Returns
         -------
@@ -377,6 +385,7 @@ class Extraction:
         InvalidInputError
             If the signature has another shape.
         """
+        tell = progress_callback(progress)
         reference = np.asarray(signature)
         if reference.shape not in ((SIGNATURE,), (SIGNATURE + 1,)):
             raise InvalidInputError(f"a signature has the shape (242,) or (243,), not {reference.shape}")
@@ -385,4 +394,6 @@ class Extraction:
         zeta = np.empty(len(self), np.float32)
         for places, rows, _ in self.iter_signatures(frame=frame, flat_atom=flat_atom):
             zeta[places] = similarity(rows, reference, either_side=either_side)
+            if tell is not None:
+                tell(places.stop, len(self))
         return zeta

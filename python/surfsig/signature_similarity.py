@@ -8,13 +8,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfsig._surfsig import GOOD, OPTIMAL
+from surfsig.arguments import progress_callback, thread_count
 from surfsig.errors import InvalidInputError
+from surfsig.progress import ProgressCallback
+from surfsig.threads import map_in_threads
 
 FIELD = 121
 """Numbers of one curvature field, on a grid of 11 x 11."""
 
 SIGNATURE = 2 * FIELD
 """Numbers of a signature: K's field, then H's."""
+
+_BLOCK = 1024
+"""Rows of a matrix of similarities that are made at a time."""
 
 
 def similarity(a: ArrayLike, b: ArrayLike, *, either_side: bool = False) -> NDArray[np.float64] | float:
@@ -51,8 +57,15 @@ def similarity(a: ArrayLike, b: ArrayLike, *, either_side: bool = False) -> NDAr
     return zeta if np.ndim(zeta) else float(zeta)
 
 
-def similarity_matrix(a: ArrayLike, b: ArrayLike, *, either_side: bool = False) -> NDArray[np.float64]:
-    """Return zeta of every row of `a` with every row of `b`, by one product.
+def similarity_matrix(
+    a: ArrayLike,
+    b: ArrayLike,
+    *,
+    either_side: bool = False,
+    threads: int | None = None,
+    progress: ProgressCallback | None = None,
+) -> NDArray[np.float64]:
+    """Return zeta of every row of `a` with every row of `b`, by products of matrices.
 
     Parameters
     ----------
@@ -60,6 +73,11 @@ def similarity_matrix(a: ArrayLike, b: ArrayLike, *, either_side: bool = False) 
         Signatures, (m, 242) and (k, 242), or both with a flat atom.
     either_side
         As in `similarity`.
+    threads
+        Number of threads; all cores by default. Within each, NumPy's matrix product may use threads of its
+        own. The result is the same.
+    progress
+        Called with the number of rows of `a` that are done, and of all.
 
     Returns
     -------
@@ -70,12 +88,27 @@ def similarity_matrix(a: ArrayLike, b: ArrayLike, *, either_side: bool = False) 
     InvalidInputError
         If the signatures are not of one length.
     """
+    workers, tell = thread_count(threads), progress_callback(progress)
     v1, v2 = np.atleast_2d(_rows(a)), np.atleast_2d(_rows(b))
     _same_length(v1, v2)
     if v1.ndim != 2 or v2.ndim != 2:
         raise InvalidInputError(f"expected rows of signatures, not the shapes {v1.shape} and {v2.shape}")
-    zeta = _zeta(v1 @ v2.T, _lengths(v1)[:, None], _lengths(v2)[None, :])
-    return np.fmax(zeta, similarity_matrix(v1, flip_signatures(v2))) if either_side else zeta
+    sides = [v2, flip_signatures(v2)] if either_side else [v2]
+    lengths = [_lengths(side)[None, :] for side in sides]
+    zeta = np.empty((len(v1), len(v2)))
+
+    def fill(start: int) -> None:
+        rows = v1[start : start + _BLOCK]
+        own = _lengths(rows)[:, None]
+        found = [_zeta(rows @ side.T, own, length) for side, length in zip(sides, lengths, strict=True)]
+        zeta[start : start + _BLOCK] = np.fmax(*found) if either_side else found[0]
+
+    def rows_done(number: int, _: int) -> None:
+        if tell is not None:
+            tell(min(number * _BLOCK, len(v1)), len(v1))
+
+    map_in_threads(fill, range(0, len(v1), _BLOCK), workers, rows_done)
+    return zeta
 
 
 def similarity_class(zeta: float) -> Literal["optimal", "good", "dissimilar"]:

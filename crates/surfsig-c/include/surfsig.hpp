@@ -465,4 +465,6 @@ private:
 
 } // namespace surfsig
 
+#include <surfsig_registration.hpp>
+
 #endif // SURFSIG_HPP

@@ -43,6 +43,11 @@ impl Failure {
         Self { code: surfsig_code::Undetermined, message: format!("the points determine no {what}") }
     }
 
+    /// The same of an argument with a name.
+    pub fn of(self, name: &str) -> Self {
+        Self { message: format!("{name}: {}", self.message), ..self }
+    }
+
     pub fn panicked(payload: &(dyn Any + Send)) -> Self {
         let text = payload.downcast_ref::<&str>().copied();
         let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str));

@@ -17,13 +17,13 @@ pub struct surfsig_transform {
 }
 
 impl surfsig_transform {
-    fn of(transform: &RigidTransform) -> Self {
+    pub(crate) fn of(transform: &RigidTransform) -> Self {
         let mut matrix = [0.0; 16];
         matrix.copy_from_slice(transform.to_matrix().as_flattened());
         Self { matrix }
     }
 
-    fn checked(&self) -> Result<RigidTransform, Failure> {
+    pub(crate) fn checked(&self) -> Result<RigidTransform, Failure> {
         let row = |i: usize| std::array::from_fn(|j| self.matrix[4 * i + j]);
         Ok(RigidTransform::from_matrix(&[row(0), row(1), row(2), row(3)])?)
     }

@@ -29,6 +29,7 @@ settings_class! {
         radius_share: f64 = radius_share,
         keypoints: usize = keypoints,
         candidates_per_radius: f64 = candidates_per_radius,
+        description_voxels_per_radius: f64 = description_voxels_per_radius,
         voxels_per_radius: f64 = voxels_per_radius,
         orientation_voxels_per_radius: f64 = orientation_voxels_per_radius,
         consensus_max_distance: f64 = consensus.max_distance,

@@ -1,6 +1,8 @@
 //! A scan: points, and what says on which side of their surface the sensor was.
 
 use crate::PointCloud;
+use crate::voxels::Voxels;
+use nalgebra::Vector3;
 
 /// A point cloud with what is known of the sensor.
 ///
@@ -59,6 +61,10 @@ impl<'a> Scan<'a> {
     }
 }
 
+/// From the middle of a scan, in any unit: what is farther counts as not finite, so that products of four coordinates
+/// are.
+const FARTHEST: f64 = 1e70;
+
 /// A scan's finite points about their middle: all digits are kept, wherever the scan lies.
 #[derive(Debug, Clone)]
 pub(crate) struct CenteredScan {
@@ -73,17 +79,18 @@ pub(crate) struct CenteredScan {
 
 impl CenteredScan {
     pub fn new(scan: &Scan<'_>) -> Self {
-        let finite: Vec<usize> =
-            (0..scan.cloud.len()).filter(|&i| scan.cloud.position(i).is_some()).collect();
-        let positions: Vec<[f64; 3]> = finite.iter().filter_map(|&i| scan.cloud.position(i)).collect();
+        let finite = (0..scan.cloud.len()).filter_map(|i| Some((i, scan.cloud.position(i)?)));
+        let finite: Vec<(usize, [f64; 3])> = finite.collect();
         let center =
-            [0, 1, 2].map(|k| median(positions.iter().map(|point| point[k]).collect()).unwrap_or(0.0));
+            [0, 1, 2].map(|k| median(finite.iter().map(|(_, point)| point[k]).collect()).unwrap_or(0.0));
         let about = |point: [f64; 3]| [0, 1, 2].map(|k| point[k] - center[k]);
+        let is_near = |point: [f64; 3]| about(point).iter().all(|x| x.abs() <= FARTHEST);
+        let near = || finite.iter().filter(|(_, point)| is_near(*point));
         Self {
-            points: positions.into_iter().map(about).collect(),
+            points: near().map(|(_, point)| about(*point)).collect(),
             center,
             viewpoint: scan.viewpoint.map(about),
-            directions: scan.directions.map(|all| finite.iter().map(|&i| all[i]).collect()),
+            directions: scan.directions.map(|all| near().map(|(i, _)| all[*i]).collect()),
         }
     }
 
@@ -91,6 +98,19 @@ impl CenteredScan {
     pub fn size(&self) -> f64 {
         let distances = self.points.iter().map(|point| point.iter().map(|x| x * x).sum::<f64>().sqrt());
         median(distances.collect()).unwrap_or(0.0)
+    }
+
+    /// The same scan with one point for each voxel, the mean of those in it; directions are added up.
+    pub fn thinned(&self, voxel: f64) -> Self {
+        let voxels = Voxels::new(&self.points, voxel);
+        let sum_of = |directions: &Vec<[f32; 3]>| -> Vec<[f32; 3]> {
+            let unit = |v: &[f32; 3]| {
+                let v = Vector3::from(v.map(f64::from));
+                v.try_normalize(0.0).unwrap_or_default().into()
+            };
+            voxels.sums(directions.iter().map(unit)).into_iter().map(|sum| sum.map(|x| x as f32)).collect()
+        };
+        Self { points: voxels.means(&self.points), directions: self.directions.as_ref().map(sum_of), ..*self }
     }
 
     pub fn scan(&self) -> Scan<'_> {
@@ -136,5 +156,8 @@ mod tests {
         assert_eq!(near.center, [1.5, 2.0, 1.0]);
         assert_eq!(near.directions.unwrap(), [directions[0], directions[2], directions[3]]);
         assert_eq!(far.center, [4e6 + 1.5, 5e6 + 2.0, 101.0]);
+        let odd = [[0.0; 3], [1.0; 3], [2.0; 3], [1e300, 0.0, 0.0], [f64::MIN, f64::MAX, 0.0]];
+        let odd = CenteredScan::new(&Scan::new(PointCloud::new_f64(&odd)));
+        assert_eq!((odd.points.len(), odd.size().is_finite()), (3, true));
     }
 }

@@ -7,27 +7,61 @@ pub(crate) fn voxel_of(point: &[f64; 3], voxel: f64) -> [i64; 3] {
     point.map(|x| (x / voxel).floor() as i64)
 }
 
+/// Which points share a voxel: of each point the number of its voxel, in the order in which voxels first occur.
+pub(crate) struct Voxels {
+    pub numbers: Vec<u32>,
+    /// Points in each.
+    pub counts: Vec<u32>,
+}
+
+impl Voxels {
+    /// # Panics
+    /// If there are 2^32 points or more.
+    pub fn new(points: &[[f64; 3]], voxel: f64) -> Self {
+        assert!(u32::try_from(points.len()).is_ok(), "fewer than 2^32 points");
+        let mut of_key: FxHashMap<[i64; 3], u32> = FxHashMap::default();
+        let mut counts = Vec::new();
+        let number = |point: &[f64; 3]| {
+            let number = *of_key.entry(voxel_of(point, voxel)).or_insert(counts.len() as u32);
+            if number as usize == counts.len() {
+                counts.push(0);
+            }
+            counts[number as usize] += 1;
+            number
+        };
+        let numbers = points.iter().map(number).collect();
+        Self { numbers, counts }
+    }
+
+    /// The sums of some vectors over the points of each voxel.
+    pub fn sums(&self, vectors: impl Iterator<Item = [f64; 3]>) -> Vec<[f64; 3]> {
+        let mut sums = vec![[0.0; 3]; self.counts.len()];
+        for (&number, vector) in self.numbers.iter().zip(vectors) {
+            for (sum, part) in sums[number as usize].iter_mut().zip(vector) {
+                *sum += part;
+            }
+        }
+        sums
+    }
+
+    /// The means of the points of each voxel.
+    pub fn means(&self, points: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let sums = self.sums(points.iter().copied());
+        sums.into_iter().zip(&self.counts).map(|(sum, &count)| sum.map(|x| x / f64::from(count))).collect()
+    }
+}
+
 /// The mean of the points of each voxel, in the order in which voxels first occur.
+///
+/// # Panics
+/// If there are 2^32 points or more.
 ///
 /// ```
 /// let points = [[0.1, 0.0, 0.0], [1.5, 0.0, 0.0], [0.3, 0.0, 0.0]];
 /// assert_eq!(surfsig::voxel_means(&points, 1.0), [[0.2, 0.0, 0.0], [1.5, 0.0, 0.0]]);
 /// ```
 pub fn voxel_means(points: &[[f64; 3]], voxel: f64) -> Vec<[f64; 3]> {
-    let mut numbers: FxHashMap<[i64; 3], usize> = FxHashMap::default();
-    let mut sums: Vec<([f64; 3], f64)> = Vec::new();
-    for point in points {
-        let number = *numbers.entry(voxel_of(point, voxel)).or_insert(sums.len());
-        if number == sums.len() {
-            sums.push(([0.0; 3], 0.0));
-        }
-        let (sum, count) = &mut sums[number];
-        for k in 0..3 {
-            sum[k] += point[k];
-        }
-        *count += 1.0;
-    }
-    sums.into_iter().map(|(sum, count)| sum.map(|x| x / count)).collect()
+    Voxels::new(points, voxel).means(points)
 }
 
 #[cfg(test)]

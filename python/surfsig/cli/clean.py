@@ -74,10 +74,12 @@ def clean_command(
         cloud = surfsig.remove_missing_returns(cloud)
         points["not_missing_returns"] = len(cloud)
     if outliers:
-        cloud = surfsig.remove_outliers(cloud, neighbors, std_ratio, threads=threads)
+        with progress_bar("removing outliers", "points", shown=shown) as progress:
+            cloud = surfsig.remove_outliers(cloud, neighbors, std_ratio, threads=threads, progress=progress)
         points["not_outliers"] = len(cloud)
     if voxel is not None:
-        cloud = surfsig.downsample(cloud, voxel)
+        with progress_bar("downsampling", "columns", shown=shown) as progress:
+            cloud = surfsig.downsample(cloud, voxel, threads=threads, progress=progress)
         points["voxels"] = len(cloud)
     with progress_bar("writing", "points", shown=shown) as progress:
         surfsig.write(output, cloud, progress=progress)

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from surfsig.cli.console import number, print_json, print_table
-from surfsig.cli.options import CLOUD, input_options, json_option, position
+from surfsig.cli.console import number, on_terminal, print_json, print_table, progress_bar
+from surfsig.cli.options import CLOUD, input_options, json_option, position, threads_option
 from surfsig.defaults import INTERVAL
 from surfsig.digits import rounded, with_error
 
 if TYPE_CHECKING:
-    from surfsig import FittedShape
+    from surfsig import Surface
 
 
 @click.group("fit", no_args_is_help=True)
@@ -46,55 +46,52 @@ def _shape_command(name: str, fit: str, text: str) -> click.Command:
     )
     @click.option("--robust", is_flag=True, help="Leave out points that are far from the surface.")
     @input_options
+    @threads_option
     @json_option
     def command(
         file: Path,
         near: tuple[float, float, float] | None,
         radius: float | None,
         robust: bool,
+        threads: int | None,
         as_json: bool,
         **reading: Any,
     ) -> None:
         import surfsig
         from surfsig.missing_returns import warn_of_missing_returns
 
-        cloud = surfsig.read(file, **reading)
+        shown = on_terminal()
+        with progress_bar("reading", "bytes", shown=shown) as progress:
+            cloud = surfsig.read(file, progress=progress, **reading)
         warn_of_missing_returns(cloud, str(file))
         try:
-            shape = getattr(surfsig, fit)(cloud, near=near, radius=radius, robust=robust)
+            with progress_bar("fitting", "steps", shown=shown) as progress:
+                surface = getattr(surfsig, fit)(
+                    cloud, near=near, radius=radius, robust=robust, threads=threads, progress=progress
+                )
         except surfsig.InvalidInputError as error:
             raise surfsig.InvalidInputError(f"{file}: {error}") from None
         if as_json:
-            print_json({"file": str(file), **_values(shape)})
+            print_json({"file": str(file), **surface.to_dict(), "points": len(cloud)})
         else:
-            print_table(str(file), _rows(shape), err=False)
+            print_table(str(file), _rows(surface, len(cloud)), err=False)
 
     return click.command(name, help=text, no_args_is_help=True)(command)
 
 
-def _values(shape: FittedShape) -> dict[str, Any]:
-    values: dict[str, Any] = {"kind": shape.kind, "center": shape.center}
-    if shape.axis is not None:
-        values["axis"] = shape.axis
-    if shape.kind != "plane":
-        values |= {"radius": shape.radius, "radius_std": shape.radius_std, "interval": shape.interval}
-    values |= {"rms": shape.rms, "count": shape.count, "points": len(shape.inliers)}
-    return values | {"covariance": shape.covariance, "degrees_of_freedom": shape.degrees_of_freedom}
-
-
-def _rows(shape: FittedShape) -> list[tuple[str, str]]:
-    errors = shape.covariance.diagonal() ** 0.5
+def _rows(surface: Surface, points: int) -> list[tuple[str, str]]:
     rows = []
-    if shape.kind != "plane":
-        low, high = shape.interval
-        ends = " to ".join(rounded(end, shape.radius_std) for end in (low, high))
-        size = with_error(shape.radius, shape.radius_std)
+    if surface.kind != "plane":
+        low, high = surface.interval
+        ends = " to ".join(rounded(end, surface.radius_std) for end in (low, high))
+        size = with_error(surface.radius, surface.radius_std)
         rows.append(("radius", f"{size}, {INTERVAL:.0%} interval {ends}"))
-    rows.append(("center", _with_errors(shape.center, errors[:3])))
-    if shape.axis is not None:
-        rows.append(("normal" if shape.kind == "plane" else "axis", _with_errors(shape.axis, errors[3:6])))
-    rows.append(("rms", f"{number(shape.rms)} from the {shape.kind}"))
-    rows.append(("points", f"{shape.count:,} of {len(shape.inliers):,}"))
+    rows.append(("center", _with_errors(surface.center, surface.center_std)))
+    if surface.kind != "sphere":
+        direction = "normal" if surface.kind == "plane" else "axis"
+        rows.append((direction, _with_errors(surface.axis, surface.axis_std)))
+    rows.append(("rms", f"{number(surface.rms)} from the {surface.kind}"))
+    rows.append(("points", f"{surface.count:,} of {points:,}"))
     return rows
 
 

@@ -98,7 +98,7 @@ def surfaces_command(
     recurring = None
     if recurrences:
         with progress_bar("comparing", "pairs", shown=shown) as progress:
-            recurring = surfsig.find_recurrences(found, progress=progress)
+            recurring = surfsig.find_recurrences(found, threads=threads, progress=progress)
     if output is not None:
         columns = {**found.columns(), "colors": found.colors}
         if recurring is not None:
@@ -129,6 +129,6 @@ def _values(file: Path, found: Surfaces, recurring: Recurrences | None) -> dict[
         "summary": found.summary(),
         "points": len(found.cloud),
         "classes": {kind.name.lower(): counts[kind] for kind in PointClass},
-        "surfaces": [{"number": number, **surface.values()} for number, surface in enumerate(found)],
+        "surfaces": [{"number": number, **surface.to_dict()} for number, surface in enumerate(found)],
     }
     return values if recurring is None else values | {"recurrences": recurring.values()}

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
-from surfsig.arguments import positive_length, thread_count, whole_number
+from surfsig.arguments import positive_length, progress_callback, thread_count, whole_number
 from surfsig.defaults import KEYPOINTS
 from surfsig.errors import InvalidInputError
 from surfsig.extraction import Status
 from surfsig.field.signatures import FieldSignatures
 from surfsig.orientation import orientation
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import ProgressCallback
 
 _MOST = 2**32 - 1
 
@@ -29,7 +29,7 @@ def find_keypoints(
     viewpoint: ArrayLike | None = None,
     normals: ArrayLike | None = None,
     threads: int | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: ProgressCallback | None = None,
 ) -> FieldSignatures:
     """Choose places that are distinctive, and spread over the scan.
 
@@ -76,7 +76,7 @@ def find_keypoints(
         viewpoint=None if sensor is None else sensor.tolist(),
         directions=directions,
         threads=thread_count(threads),
-        progress=progress,
+        progress=progress_callback(progress),
     )
     indices = found.pop("indices").astype(np.int64)
     return FieldSignatures(

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig import _surfsig
-from surfsig.arguments import thread_count
+from surfsig.arguments import progress_callback, thread_count
 from surfsig.errors import InvalidInputError
 from surfsig.field.signatures import FieldSignatures
+from surfsig.progress import Progress, ProgressCallback
 
 _Float32 = NDArray[np.float32]
 _Places = tuple[NDArray[np.float64], _Float32, _Float32, _Float32, _Float32]
@@ -41,7 +42,12 @@ class FieldMatches:
 
 
 def match_fields(
-    source: FieldSignatures, target: FieldSignatures, *, mutual: bool = True, threads: int | None = None
+    source: FieldSignatures,
+    target: FieldSignatures,
+    *,
+    mutual: bool = True,
+    threads: int | None = None,
+    progress: ProgressCallback | None = None,
 ) -> FieldMatches:
     """Find for each place of the source the most similar one of the target.
 
@@ -54,6 +60,9 @@ def match_fields(
         Whether only matches stay of which each place is the other's most similar.
     threads
         Number of threads; all cores by default. The result is the same, bit for bit.
+    progress
+        Called before and after the search, with the number of places of the source that are matched, and of
+        all.
 
     Returns
     -------
@@ -65,14 +74,18 @@ def match_fields(
     InvalidInputError
         If the radii differ.
     """
+    workers, tell = thread_count(threads), progress_callback(progress)
     if source.radius != target.radius:
         raise InvalidInputError(
             f"signatures of different radii cannot be matched: {source.radius:g} and {target.radius:g}"
         )
     ours, theirs = np.flatnonzero(source.ok), np.flatnonzero(target.ok)
+    done = Progress(tell, len(ours))
+    done.advance(0)
     found = _surfsig.match_fields(
-        _places(source.take(ours)), _places(target.take(theirs)), mutual=mutual, threads=thread_count(threads)
+        _places(source.take(ours)), _places(target.take(theirs)), mutual=mutual, threads=workers
     )
+    done.advance(len(ours))
     return FieldMatches(ours[found["source"]], theirs[found["target"]], found["distances"], found["poses"])
 
 

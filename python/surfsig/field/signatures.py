@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
-from surfsig.arguments import place_numbers, positive_length, thread_count
+from surfsig.arguments import positive_length, progress_callback, thread_count
 from surfsig.extraction import Status
 from surfsig.orientation import orientation
-from surfsig.places import places
+from surfsig.places import place_numbers, places
 from surfsig.point_cloud import PointCloud
 
 FloatArray = NDArray[np.float32]
@@ -159,7 +159,7 @@ def extract_field_signatures(
         viewpoint=None if sensor is None else sensor.tolist(),
         directions=directions,
         threads=thread_count(threads),
-        progress=progress,
+        progress=progress_callback(progress),
     )
     return FieldSignatures(
         radius=size,

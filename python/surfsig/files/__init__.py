@@ -19,7 +19,6 @@ from surfsig.files import formats
 from surfsig.files.atomic import check_target, replacing
 from surfsig.files.columns import Chunks, output_columns
 from surfsig.files.paths import Paths, files_meant
-from surfsig.files.progress import Progress, ProgressCallback
 from surfsig.files.read_file import ReadOptions, read_file
 from surfsig.files.sequence import ScanSequence, TimedScan, open_scan_sequence
 from surfsig.files.several import read_several
@@ -31,6 +30,7 @@ from surfsig.files.trajectory import (
     write_trajectory,
 )
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress, ProgressCallback
 
 __all__ = [
     "Chunks",

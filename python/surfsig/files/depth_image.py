@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfsig.defaults import DEPTH_SCALE
 from surfsig.errors import FileFormatError, InvalidInputError
-from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 MAGIC = b"\x89PNG\r\n\x1a\n"
 

@@ -11,9 +11,9 @@ from surfsig import _surfsig
 from surfsig.errors import FileFormatError
 from surfsig.files.colours import with_colours
 from surfsig.files.e57_names import field_names
-from surfsig.files.progress import Progress
 from surfsig.files.scans import joined_scans, scan_number
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 MAGIC = b"ASTM-E57"
 

@@ -15,8 +15,8 @@ from surfsig import _surfsig
 from surfsig.errors import InvalidInputError
 from surfsig.files.columns import Chunks, aligned_blocks, column_names, exact_float32, scalar_columns
 from surfsig.files.e57_names import EXTENSIONS, record_names
-from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 _BLOCK_ROWS = 1 << 16
 _AXES = ("cartesianX", "cartesianY", "cartesianZ")

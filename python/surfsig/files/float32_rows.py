@@ -14,9 +14,9 @@ from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.columns import cloud_from_columns, filled_columns
 from surfsig.files.float32_layout import FARTHEST, LAYOUTS, RowLayout, fitting_layouts, sample
 from surfsig.files.options import LEFT_OUT
-from surfsig.files.progress import Progress
 from surfsig.files.rows import row_blocks
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 _FLOAT_BYTES = 4
 _HINT = 'columns="x,y,z,intensity" names the values of a row'

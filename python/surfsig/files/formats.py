@@ -35,8 +35,8 @@ from surfsig.files import (
 )
 from surfsig.files.columns import Chunks
 from surfsig.files.encodings import WIDE_MARKS, decoded_head
-from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 HEAD_BYTES = 4096
 # What hardly occurs in a text: control characters that are no white space.

@@ -14,8 +14,8 @@ from surfsig.files.encodings import decoded
 from surfsig.files.gltf_accessors import Accessors
 from surfsig.files.gltf_meshes import DRACO, Meshes
 from surfsig.files.gltf_scene import shown_meshes
-from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 GLB_MAGIC = b"glTF"
 

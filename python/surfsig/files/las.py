@@ -18,8 +18,8 @@ from surfsig.files.las_counts import LARGEST_HEADER, Held, agreed_count, end_of_
 from surfsig.files.las_header import RECORD_ID, USER_ID, check_coordinates, read_header
 from surfsig.files.laz_chunks import PIECE_BYTES, Chunk, copc_chunks, decoded, laz_chunks, one_line_errors
 from surfsig.files.options import inside
-from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 # Few enough that a block of records stays in the processor's cache while it is taken apart.
 _BLOCK_POINTS = 1 << 13

@@ -25,8 +25,8 @@ from surfsig.files.las_header import (
     USER_ID,
     WKT,
 )
-from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 # Coordinates are whole numbers of 1e-3 to 1e-9 units.
 _DECIMALS = range(3, 10)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from surfsig.errors import FileFormatError
 from surfsig.files import laz_child
 from surfsig.files.las_counts import Held, agreed_count
-from surfsig.files.progress import Progress
+from surfsig.progress import Progress
 
 # Points are decoded in pieces of about so many bytes: several chunks, one for each thread.
 PIECE_BYTES = 32 << 20

@@ -20,7 +20,7 @@ from surfsig.files.number_words import (
     is_number,
     why_no_number,
 )
-from surfsig.files.progress import Progress
+from surfsig.progress import Progress
 
 BLOCK_BYTES = 1 << 22
 COMMENT_MARKS = ("#", "//", "%")

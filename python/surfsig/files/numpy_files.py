@@ -28,9 +28,9 @@ from surfsig.files.columns import (
 )
 from surfsig.files.first_columns import FEW_ROWS, MANY_COLUMNS
 from surfsig.files.options import LEFT_OUT, check_width
-from surfsig.files.progress import Progress
 from surfsig.files.rows import filled
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 NPY_MAGIC = npy.MAGIC_PREFIX
 ZIP_MAGIC = b"PK"

@@ -14,8 +14,8 @@ from surfsig.files.columns import cloud_from_columns
 from surfsig.files.encodings import decoded
 from surfsig.files.lines import Block, line_blocks, parse, warn_unterminated
 from surfsig.files.obj_vertices import COLOURS, Vertices
-from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 _WORDS = (
     "v", "vn", "vt", "vp", "f", "fo", "l", "p", "o", "g", "s", "mg", "mtllib", "usemtl", "maplib", "usemap",

@@ -15,8 +15,8 @@ from surfsig.files.colours import ALPHA, CHANNELS
 from surfsig.files.columns import cloud_from_columns
 from surfsig.files.encodings import decoded
 from surfsig.files.lines import Block, line_blocks, parse, tokens_of, warn_unterminated
-from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 _WORD = r"(ST)?(C)?(N)?([4n]*)OFF"
 # Some programs leave out the line end after the word, and so its first number follows.

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from surfsig.convert import arrow
 from surfsig.errors import FileFormatError
 from surfsig.files.columns import Chunks, aligned_blocks
-from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 MAGIC = b"PAR1"
 

@@ -16,9 +16,9 @@ from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.columns import cloud_from_columns, filled_columns, unique_name
 from surfsig.files.pcd_ascii import read_ascii
 from surfsig.files.pcd_header import EXACT, PACKED_COLOURS, Header, check_size, is_packed_colour, read_header
-from surfsig.files.progress import Progress
 from surfsig.files.rows import row_blocks
 from surfsig.point_cloud import PointCloud, position_array
+from surfsig.progress import Progress
 
 # LZF's longest back reference makes 264 bytes of 3.
 MAX_LZF_RATIO = 88

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from surfsig.files.lines import take_rows
 from surfsig.files.pcd_header import Header, check_size, is_packed_colour
-from surfsig.files.progress import Progress
+from surfsig.progress import Progress
 
 # So much text shows how a file writes its colours.
 _SAMPLE_BYTES = 1 << 16

@@ -19,9 +19,9 @@ from surfsig.files.columns import (
     unique_name,
 )
 from surfsig.files.pcd_header import EXACT, NOTE, OWN_NOTES, PACKED_COLOURS
-from surfsig.files.progress import Progress
 from surfsig.files.rows import write_rows
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 # `rgb` and `rgba` mean packed colours to every reader, and `_` means padding.
 RESERVED = ("x", "y", "z", *EXACT, *PACKED_COLOURS, "_")

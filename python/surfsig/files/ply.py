@@ -26,9 +26,9 @@ from surfsig.files.lines import take_rows
 from surfsig.files.ply_elements import element_blocks, skip_element
 from surfsig.files.ply_faces import Faces
 from surfsig.files.ply_header import read_header
-from surfsig.files.progress import Progress
 from surfsig.files.rows import write_rows
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 _NAMES = {
     "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort", "i4": "int", "u4": "uint", "f4": "float",

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
-from surfsig.files.progress import Progress
 from surfsig.files.rows import BLOCK_BYTES, filled
+from surfsig.progress import Progress
 
 # Rows that are looked at one by one before their numbers are taken.
 VISITED_ROWS = 4096

@@ -11,7 +11,7 @@ import numpy as np
 from surfsig.errors import InvalidInputError
 from surfsig.files.lines import line_blocks
 from surfsig.files.ply_elements import Element, Lists, written_length
-from surfsig.files.progress import Progress
+from surfsig.progress import Progress
 
 _CORNERS = ("vertex_indices", "vertex_index")
 

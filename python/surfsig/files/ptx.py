@@ -14,9 +14,9 @@ from surfsig.errors import FileFormatError
 from surfsig.files.columns import cloud_from_columns
 from surfsig.files.encodings import decoded
 from surfsig.files.lines import line_blocks, parse, warn_unterminated
-from surfsig.files.progress import Progress
 from surfsig.files.scans import joined_scans, scan_number
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 # Two counts, a position of three numbers, three axes and the first row of a matrix.
 _NUMBER = rb"[-+]?[\d.][-+.\deE]*"

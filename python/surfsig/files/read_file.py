@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files import formats
 from surfsig.files.options import box_array, check_unit, column_names, cropped, in_metres, metres_per
-from surfsig.files.progress import Progress, ProgressCallback
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress, ProgressCallback
 from surfsig.visibility import without_false_viewpoint
 
 

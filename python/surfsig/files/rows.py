@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
 from surfsig.files.columns import Chunks, aligned_blocks
-from surfsig.files.progress import Progress
+from surfsig.progress import Progress
 
 # Small enough to stay in a processor's cache while it is split into columns.
 BLOCK_BYTES = 1 << 19

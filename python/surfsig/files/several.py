@@ -7,8 +7,8 @@ from pathlib import Path
 
 from surfsig.files import formats
 from surfsig.files.joined import joined
-from surfsig.files.progress import ProgressCallback
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import ProgressCallback
 
 # Formats whose colours have 16 bits, into which programs write those of 8.
 _BYTES_IN_16_BITS = ("LAS", "LAZ")

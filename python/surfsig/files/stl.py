@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from surfsig.errors import FileFormatError
 from surfsig.files import mesh
 from surfsig.files.lines import line_blocks, parse
-from surfsig.files.progress import Progress
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 ASCII_MAGIC = re.compile(rb"\s*solid\b.*?\b(facet|endsolid)\b", re.IGNORECASE | re.DOTALL)
 

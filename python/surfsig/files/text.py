@@ -21,10 +21,10 @@ from surfsig.files.lines import (
     warn_dropped,
     warn_unterminated,
 )
-from surfsig.files.progress import Progress
 from surfsig.files.scans import joined_scans, scan_number
 from surfsig.files.text_layout import Layout, count_of, layout_of
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 # What the layout is told by: a thousand rows, or, where they are very wide, a few.
 _HEAD_BYTES, _MOST_HEAD_BYTES = 1 << 16, 1 << 22

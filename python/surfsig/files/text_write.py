@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.files.columns import Chunks, aligned_blocks, column_names, scalar_columns
-from surfsig.files.progress import Progress
 from surfsig.files.text_notes import note_lines
 from surfsig.point_cloud import PointCloud
+from surfsig.progress import Progress
 
 # Rows that are text at the same time: some MB.
 _BLOCK_ROWS = 1 << 14

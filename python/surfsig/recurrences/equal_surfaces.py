@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from surfsig.alignment.free_directions import FreeDirection, free_directions_of_surface
+from surfsig.alignment.free_directions import FreeDirection
 from surfsig.geometry import axes_across, from_rotation_vector, transform_points
 
 if TYPE_CHECKING:
@@ -90,8 +90,8 @@ def equal_surfaces(found: Sequence[Surfaces], confidence: float) -> list[EqualSu
                 mean, error = (dict(zip(names, values.tolist(), strict=True)) for values in pooled)
                 first = members[rows[0]]
                 poses = np.stack([_motion(first, members[row]) for row in rows])
-                free = free_directions_of_surface(kind, first.center, first.axis)
-                groups.append(EqualSurfaces(kind, mean, error, [keys[row] for row in rows], poses, free))
+                numbers = [keys[row] for row in rows]
+                groups.append(EqualSurfaces(kind, mean, error, numbers, poses, first.free_directions))
     return sorted(groups, key=lambda group: group.members[0])
 
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.geometry import inverse
+from surfsig.progress import ProgressCallback
 from surfsig.recurrences.alignment import Alignment, align, measured, refined
 from surfsig.recurrences.grouping import ways_from_first
 from surfsig.recurrences.main_surface import may_be_equal
 from surfsig.recurrences.view import View
 from surfsig.surfaces import Surface
+from surfsig.threads import map_in_threads
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ def matched_pairs(
     mains: Sequence[Surface | None],
     seed: int,
     threads: int | None,
-    progress: Callable[[int, int], object] | None,
+    progress: ProgressCallback | None,
 ) -> Pairs:
     """Align all pairs of pieces whose signatures are alike.
 
@@ -57,7 +58,7 @@ def matched_pairs(
     seed
         Of the searches.
     threads
-        How many work; None for one for each core, and some.
+        How many work; None for one for each core.
     progress
         Called with the pairs done, and of all.
     """
@@ -69,14 +70,9 @@ def matched_pairs(
             return None
         return align(views[i], views[j], np.random.default_rng([seed, i, j]))
 
-    pairs: Pairs = {}
     # Each pair has its own generator: the result does not depend on the number of threads.
-    with ThreadPoolExecutor(threads) as pool:
-        for done, (pair, found) in enumerate(zip(numbers, pool.map(matched, numbers), strict=True)):
-            if found is not None:
-                pairs[pair] = found
-            if progress is not None:
-                progress(done + 1, len(numbers))
+    aligned = map_in_threads(matched, numbers, threads, progress)
+    pairs: Pairs = {pair: found for pair, found in zip(numbers, aligned, strict=True) if found is not None}
     _take_detours(pairs, views, mains, seed)
     return pairs
 

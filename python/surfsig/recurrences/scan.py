@@ -37,8 +37,9 @@ _NOISES, _SPACINGS = 3.0, 0.4
 class ScanPieces:
     """A scan with its pieces; coordinates are those of its offsets."""
 
-    def __init__(self, number: int, found: Surfaces, fewest: int) -> None:
+    def __init__(self, number: int, found: Surfaces, fewest: int, threads: int | None) -> None:
         self.number, self.found, self.cloud = number, found, found.cloud
+        self._threads = threads
         self.numbers = np.flatnonzero(self.cloud.finite)
         self.points = self.cloud.offsets[self.numbers].astype(np.float64)
         self.spacing = 0.0
@@ -75,7 +76,9 @@ class ScanPieces:
             return []
         standpoint = Standpoint(self.cloud, self._regions(), self.spacing)
         guessed = None if standpoint.place is None else standpoint.place + self.cloud.origin
-        around = extract(self.cloud, radius=_NORMAL_BALL * self.spacing, viewpoint=guessed)
+        around = extract(
+            self.cloud, radius=_NORMAL_BALL * self.spacing, viewpoint=guessed, threads=self._threads
+        )
         normals = around.normals[self.numbers].astype(np.float64)
         known = np.asarray(np.isfinite(normals).all(axis=1))
         normals[~known] = (0.0, 0.0, 1.0)
@@ -104,7 +107,7 @@ class ScanPieces:
         if not self.pieces:
             return []
         at = np.concatenate(self.pieces)
-        around = extract(self.cloud, radius=_SIGNATURE_BALL * self.spacing, at=at)
+        around = extract(self.cloud, radius=_SIGNATURE_BALL * self.spacing, at=at, threads=self._threads)
         result, start = [], 0
         try:
             flat = flat_atom_length(around)

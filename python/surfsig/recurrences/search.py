@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.alignment.free_directions import free_directions
-from surfsig.arguments import whole_number
+from surfsig.arguments import progress_callback, thread_count, whole_number
 from surfsig.defaults import (
     RECURRENCE_CONFIDENCE,
     RECURRENCE_POINTS,
@@ -17,6 +17,7 @@ from surfsig.defaults import (
 )
 from surfsig.errors import InvalidInputError
 from surfsig.geometry import rotate
+from surfsig.progress import ProgressCallback
 from surfsig.recurrences.equal_surfaces import equal_surfaces
 from surfsig.recurrences.grouping import groups_of, ways_from_first
 from surfsig.recurrences.main_surface import main_surface
@@ -36,7 +37,8 @@ def find_recurrences(
     found: Surfaces | Sequence[Surfaces],
     *,
     min_points: int = RECURRENCE_POINTS,
-    progress: Callable[[int, int], object] | None = None,
+    threads: int | None = None,
+    progress: ProgressCallback | None = None,
 ) -> Recurrences:
     """Find what occurs more than once in a scan, or in several, without a model.
 
@@ -54,6 +56,9 @@ def find_recurrences(
         per value of the field ``scan``); without, shadows tell the direction it was in, with a warning.
     min_points
         Fewest points of a piece.
+    threads
+        Number of threads; by default the largest number that the scans' surfaces were found with, which is
+        all cores where none was asked for. The result is the same.
     progress
         Called with the pairs of pieces that have been compared, and of all.
 
@@ -72,12 +77,14 @@ def find_recurrences(
     if not all(isinstance(scan, Surfaces) for scan in scans):
         raise InvalidInputError("found must be what surfsig.find_surfaces returns, or a list of such")
     fewest = whole_number(min_points, "min_points", 1 << 40)
+    tell = progress_callback(progress)
+    workers = thread_count(threads) or max((scan.threads or 0 for scan in scans), default=0) or None
     pieces: list[Piece] = []
     views: list[View] = []
     signatures: list[Array] = []
     smooth: list[tuple[Array, Array]] = []
     labels = [np.full(len(scan.cloud), -1, np.int32) for scan in scans]
-    prepared = [ScanPieces(number, scan, fewest) for number, scan in enumerate(scans)]
+    prepared = [ScanPieces(number, scan, fewest, workers) for number, scan in enumerate(scans)]
     extents = [extent for scan in prepared for extent in scan.extents()]
     length = _PAIR_UNIT * float(np.median(extents)) if extents else 1.0
     several = len(extents) > 1
@@ -91,8 +98,7 @@ def find_recurrences(
             signatures += [rows for rows, _, _ in described]
             smooth += [(points + scan.cloud.origin, normals) for _, points, normals in described]
     mains = [main_surface(piece, scans[piece.scan]) for piece in pieces]
-    threads = max((scan.threads or 0 for scan in scans), default=0) or None
-    pairs = matched_pairs(views, signatures, mains, RECURRENCE_SEED, threads, progress)
+    pairs = matched_pairs(views, signatures, mains, RECURRENCE_SEED, workers, tell)
     scores = scores_of(pairs, len(pieces))
     middles = [
         view.middle + scans[piece.scan].cloud.origin for view, piece in zip(views, pieces, strict=False)

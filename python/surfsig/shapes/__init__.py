@@ -6,19 +6,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
-from surfsig.arguments import positive_length
+from surfsig.arguments import positive_length, progress_callback, thread_count
 from surfsig.clean import COORDINATE_LIMIT
 from surfsig.digits import position_text
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud, position_array
+from surfsig.progress import ProgressCallback
 from surfsig.resolution import warn_if_surface_is_lost
-from surfsig.shapes.fitted import FittedShape, fitted_shape
 from surfsig.shapes.growth import grown
-from surfsig.shapes.robust import Kind, settled
+from surfsig.shapes.robust import settled
+from surfsig.shapes.surface import KINDS, Kind, Surface, measured_surface
 
 Array = NDArray[np.float64]
 
-__all__ = ["FittedShape", "fit_cylinder", "fit_plane", "fit_sphere"]
+__all__ = ["KINDS", "Kind", "Surface", "fit_cylinder", "fit_plane", "fit_sphere"]
 
 
 def fit_sphere(
@@ -27,7 +28,9 @@ def fit_sphere(
     near: ArrayLike | None = None,
     radius: float | None = None,
     robust: bool = False,
-) -> FittedShape:
+    threads: int | None = None,
+    progress: ProgressCallback | None = None,
+) -> Surface:
     """Fit a sphere to points, or to the points of a scan that are on a sphere near a place.
 
     The sum of squared distances from the surface is least. The standard errors do not rely on the number of
@@ -52,10 +55,16 @@ def fit_sphere(
     robust
         Whether to leave out points farther than 3 standard deviations from the surface, judged by the median,
         and fit again until none is left; with `near` this is always done.
+    threads
+        Number of threads; all cores by default. Two starts are grown at a time; a single fit takes one
+        thread. The result is the same.
+    progress
+        Called with the number of steps done, and how many there are at most: starts with `near` (the last
+        ones are seldom needed), else fits.
 
     Returns
     -------
-    FittedShape
+    Surface
         With `radius`, its standard error `radius_std` and its 95 % `interval`.
 
     Raises
@@ -63,7 +72,7 @@ def fit_sphere(
     InvalidInputError
         If the points are too few, or determine no sphere; or an argument has no meaning.
     """
-    return _fit("sphere", cloud, near, radius, robust)
+    return _fit("sphere", cloud, near, radius, robust, threads, progress)
 
 
 def fit_cylinder(
@@ -72,17 +81,19 @@ def fit_cylinder(
     near: ArrayLike | None = None,
     radius: float | None = None,
     robust: bool = False,
-) -> FittedShape:
+    threads: int | None = None,
+    progress: ProgressCallback | None = None,
+) -> Surface:
     """Fit a cylinder without ends to points, or to those of a scan that are on a cylinder near a place.
 
     Parameters
     ----------
-    cloud, near, radius, robust
+    cloud, near, radius, robust, threads, progress
         As for `fit_sphere`.
 
     Returns
     -------
-    FittedShape
+    Surface
         With `axis`, `radius`, its standard error `radius_std` and its 95 % `interval`.
 
     Raises
@@ -90,7 +101,7 @@ def fit_cylinder(
     InvalidInputError
         As `fit_sphere`.
     """
-    return _fit("cylinder", cloud, near, radius, robust)
+    return _fit("cylinder", cloud, near, radius, robust, threads, progress)
 
 
 def fit_plane(
@@ -99,17 +110,19 @@ def fit_plane(
     near: ArrayLike | None = None,
     radius: float | None = None,
     robust: bool = False,
-) -> FittedShape:
+    threads: int | None = None,
+    progress: ProgressCallback | None = None,
+) -> Surface:
     """Fit a plane to points, or to those of a scan that are on a plane near a place.
 
     Parameters
     ----------
-    cloud, near, radius, robust
+    cloud, near, radius, robust, threads, progress
         As for `fit_sphere`.
 
     Returns
     -------
-    FittedShape
+    Surface
         With the normal as `axis`.
 
     Raises
@@ -117,7 +130,7 @@ def fit_plane(
     InvalidInputError
         As `fit_sphere`.
     """
-    return _fit("plane", cloud, near, radius, robust)
+    return _fit("plane", cloud, near, radius, robust, threads, progress)
 
 
 def _fit(
@@ -126,7 +139,10 @@ def _fit(
     place: ArrayLike | None,
     radius: float | None,
     robust: bool,
-) -> FittedShape:
+    threads: int | None,
+    progress: ProgressCallback | None,
+) -> Surface:
+    workers, tell = thread_count(threads), progress_callback(progress)
     cloud = PointCloud.of(data)
     warn_if_surface_is_lost(cloud, stacklevel=4)
     finite = cloud.finite
@@ -139,19 +155,38 @@ def _fit(
     if radius is not None and place is None:
         raise InvalidInputError("radius is that of the ball around near: give near, too")
     if place is None:
-        found = settled(kind, points, robust=robust)
+        found = settled(kind, points, robust=robust, progress=tell)
     else:
         start = None if radius is None else positive_length(radius, "radius")
         position = position_array(place, "near")
         _check_near(points, position - cloud.origin, start, position)
-        found = grown(kind, points, position - cloud.origin, start)
+        found = grown(kind, points, position - cloud.origin, start, workers, tell)
     if found is None:
         where = "" if place is None else " near that place"
         raise InvalidInputError(f"the points{where} determine no {kind}")
-    surface, chosen = found
-    inliers = np.zeros(len(cloud), np.bool_)
-    inliers[np.flatnonzero(finite)[chosen]] = True
-    return fitted_shape(kind, surface, cloud, inliers)
+    primitive, chosen = found
+    return _described(kind, primitive, points[chosen], cloud.origin, np.flatnonzero(finite)[chosen])
+
+
+def _described(
+    kind: Kind, primitive: _surfsig.Primitive, points: Array, origin: Array, members: NDArray[np.intp]
+) -> Surface:
+    """Describe a surface that was fitted to points, both less the origin."""
+    covariance, across, freedom = primitive.uncertainty(points)
+    squares = float((primitive.distances(points) ** 2).sum())
+    fitted = {
+        "kind": kind,
+        "point": primitive.point + origin,
+        "axis": np.full(3, np.nan) if kind == "sphere" else primitive.axis,
+        "radius": primitive.radius,
+        "major_radius": np.nan,
+        "half_angle": np.nan,
+        "deviation": np.sqrt(squares / (len(points) - _surfsig.KIND_PARAMETERS[kind])),
+        "covariance": covariance,
+        "across": across,
+        "freedom": freedom,
+    }
+    return measured_surface(fitted, points, origin, members)
 
 
 def _check_near(points: Array, place: Array, radius: float | None, given: Array) -> None:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfsig import _surfsig
-from surfsig.shapes.robust import MAX_PASSES, Array, Kind, near, rounding_of, settled
+from surfsig.progress import Progress, ProgressCallback
+from surfsig.shapes.robust import MAX_PASSES, Array, near, rounding_of, settled
+from surfsig.shapes.surface import Kind
+from surfsig.threads import map_in_threads
 
 Mask = NDArray[np.bool_]
 
@@ -42,7 +45,14 @@ class Grown(NamedTuple):
     inliers: Mask
 
 
-def grown(kind: Kind, points: Array, place: Array, radius: float | None) -> Grown | None:
+def grown(
+    kind: Kind,
+    points: Array,
+    place: Array,
+    radius: float | None,
+    threads: int | None = None,
+    progress: ProgressCallback | None = None,
+) -> Grown | None:
     """Fit a shape to the points around a place, then to all that are near its surface, until they stand.
 
     Without a radius, ever more of the nearest points are tried, until two starts lead to the same shape.
@@ -59,6 +69,10 @@ def grown(kind: Kind, points: Array, place: Array, radius: float | None) -> Grow
         (3,), on the surface or near it.
     radius
         Of the ball whose points are the start, or None.
+    threads
+        Of those at hand, up to `_AGREEMENT` are used: so many starts are needed anyway.
+    progress
+        Called with the number of starts done, and of all.
 
     Returns
     -------
@@ -66,19 +80,16 @@ def grown(kind: Kind, points: Array, place: Array, radius: float | None) -> Grow
         None where there is no such shape.
     """
     found: list[tuple[Grown, int]] = []
-    for seeds in _starts(points, place, radius):
-        shape = _from_seeds(kind, points, seeds)
-        if shape is None:
-            continue
-        for number, (other, votes) in enumerate(found):
-            if _same(shape.inliers, other.inliers):
-                # The larger start knows it better.
-                found[number] = (shape, votes + 1)
-                break
-        else:
-            found.append((shape, 1))
-        if any(votes == _AGREEMENT for _, votes in found):
+    starts = _starts(points, place, radius)
+    done = Progress(progress, len(starts))
+    for number in range(0, len(starts), _AGREEMENT):
+        batch = starts[number : number + _AGREEMENT]
+        shapes = map_in_threads(
+            partial(_from_seeds, kind, points), batch, threads, lambda _done, _total: done.advance(1)
+        )
+        if any(_agreed(shape, found) for shape in shapes):
             break
+    done.advance(len(starts))
     if not found:
         return None
     # Of equal ones the first, which is the smallest start's.
@@ -86,16 +97,30 @@ def grown(kind: Kind, points: Array, place: Array, radius: float | None) -> Grow
     return best[0]
 
 
-def _starts(points: Array, place: Array, radius: float | None) -> Iterator[NDArray[np.intp]]:
+def _agreed(shape: Grown | None, found: list[tuple[Grown, int]]) -> bool:
+    """Count the start that led to a shape among those found; tell whether enough starts led to that shape."""
+    if shape is None:
+        return False
+    for number, (other, votes) in enumerate(found):
+        if _same(shape.inliers, other.inliers):
+            # The larger start knows it better.
+            found[number] = (shape, votes + 1)
+            return votes + 1 == _AGREEMENT
+    found.append((shape, 1))
+    return False
+
+
+def _starts(points: Array, place: Array, radius: float | None) -> list[NDArray[np.intp]]:
     distances = np.linalg.norm(points - place, axis=1)
     if radius is not None:
-        yield np.flatnonzero(distances <= radius)
-        return
+        return [np.flatnonzero(distances <= radius)]
     order = np.argsort(distances, kind="stable")
+    counts = []
     count = _FEWEST
     while count < 2 * len(points):
-        yield order[:count]
+        counts.append(count)
         count *= 2
+    return [order[:count] for count in counts]
 
 
 def _from_seeds(kind: Kind, points: Array, seeds: NDArray[np.intp]) -> Grown | None:

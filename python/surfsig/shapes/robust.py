@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
 from surfsig import _surfsig
+from surfsig.progress import Progress, ProgressCallback
+from surfsig.shapes.surface import Kind
 
 Array = NDArray[np.float64]
-
-Kind = Literal["sphere", "cylinder", "plane"]
 
 FAR = 3.0
 """A point this many standard deviations from the surface is an outlier, as for `surfsig.extract`."""
@@ -27,27 +25,32 @@ MAX_PASSES = 50
 
 
 def settled(
-    kind: Kind, points: Array, *, robust: bool
+    kind: Kind, points: Array, *, robust: bool, progress: ProgressCallback | None = None
 ) -> tuple[_surfsig.Primitive, NDArray[np.bool_]] | None:
     """Fit a surface, and say which points count; `robust` leaves out those that are far from it.
 
     What is far is judged by the median distance of all points, which outliers hardly move; points leave and
     come back until the choice stands.
     """
+    passes = MAX_PASSES if robust else 0
+    done = Progress(progress, 1 + passes)
     surface = _surfsig.fit_primitive(points, kind)
+    done.advance(1)
     if surface is None:
         return None
     inliers = np.ones(len(points), np.bool_)
     rounding = rounding_of(points)
-    for _ in range(MAX_PASSES if robust else 0):
+    for _ in range(passes):
         distances = surface.distances(points)
         chosen = near(distances, distances, rounding)
         if np.array_equal(chosen, inliers):
             break
         inliers = chosen
         surface = _surfsig.fit_primitive(points[inliers], kind, surface)
+        done.advance(1)
         if surface is None:
             return None
+    done.advance(passes)
     return surface, inliers
 
 

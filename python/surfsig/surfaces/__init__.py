@@ -3,9 +3,9 @@
 `surfsig.find_surfaces` finds them; `Surfaces` is what it gives.
 """
 
+from surfsig.shapes.surface import KINDS, Kind, Surface
 from surfsig.surfaces.classes import PointClass
 from surfsig.surfaces.found import Surfaces
 from surfsig.surfaces.search import find_surfaces
-from surfsig.surfaces.surface import KINDS, Kind, Surface
 
 __all__ = ["KINDS", "Kind", "PointClass", "Surface", "Surfaces", "find_surfaces"]

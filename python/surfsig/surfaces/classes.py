@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from surfsig.curvature import extract
 from surfsig.extraction import Extraction, Status
 from surfsig.point_cloud import PointCloud
-from surfsig.surfaces.surface import Surface
+from surfsig.shapes.surface import Surface
 
 NEIGHBORS = 24
 """Nearest points by which a point is judged that belongs to no surface."""

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from surfsig import _surfsig
 from surfsig.colors import GREY, distinct_colors
 from surfsig.point_cloud import PointCloud
+from surfsig.shapes.surface import Surface
 from surfsig.surfaces.classes import PointClass, classify
-from surfsig.surfaces.surface import Surface
 from surfsig.surfaces.wording import HEADER, table_rows
 
 if TYPE_CHECKING:
@@ -76,21 +76,6 @@ class Surfaces:
         saddle, the probability that both curvatures have their sign; of a free form, what that lacks to 1.
         """
         return self._classified[1]
-
-    def members(self, number: int) -> NDArray[np.intp]:
-        """Give the points of a surface.
-
-        Parameters
-        ----------
-        number
-            The surface's.
-
-        Returns
-        -------
-        numpy.ndarray
-            The numbers of its points, (m,).
-        """
-        return np.flatnonzero(self.labels == range(len(self))[number])
 
     def summary(self) -> str:
         """Say in words how many surfaces of each kind there are.

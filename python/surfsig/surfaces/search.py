@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surfsig import _surfsig
-from surfsig.arguments import MOST_NEIGHBORS, positive_length, thread_count, whole_number
+from surfsig.arguments import MOST_NEIGHBORS, positive_length, progress_callback, thread_count, whole_number
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud
 from surfsig.resolution import warn_if_surface_is_lost
+from surfsig.shapes.surface import KINDS, Kind, measured_surface
 from surfsig.surfaces.classes import members_of
 from surfsig.surfaces.found import Surfaces
-from surfsig.surfaces.surface import KINDS, Kind, described
 
 
 def find_surfaces(
@@ -75,11 +75,11 @@ def find_surfaces(
         min_points=None if min_points is None else whole_number(min_points, "min_points", MOST_NEIGHBORS),
         noise=noise,
         threads=threads,
-        progress=progress,
+        progress=progress_callback(progress),
     )
     members = members_of(labels, len(entries))
     found = [
-        described(entry, scan.offsets[chosen].astype(np.float64), scan.origin)
+        measured_surface(entry, scan.offsets[chosen].astype(np.float64), scan.origin, chosen)
         for entry, chosen in zip(entries, members, strict=True)
     ]
     return Surfaces(scan, labels, found, noise, threads)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 
 from surfsig.digits import decimals_of
-from surfsig.surfaces.surface import Surface
+from surfsig.shapes.surface import Surface
 
 HEADER = ("", "kind", "radius", "95 % interval", "size", "area", "points", "rms")
 

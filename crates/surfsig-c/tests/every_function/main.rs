@@ -103,6 +103,7 @@ macro_rules! null_of_null {
 // After the macros, which they use.
 mod arguments;
 mod fits;
+mod poses;
 mod results;
 
 #[test]
@@ -116,6 +117,8 @@ fn no_function_of_the_header_fails_but_by_a_code() {
     fits::primitives(&mut called);
     fits::moments(&mut called);
     fits::transforms(&mut called);
+    poses::registration_options(&mut called);
+    poses::registrations(&mut called);
 
     let header = Path::new(env!("CARGO_MANIFEST_DIR")).join("include/surfsig.h");
     let text = std::fs::read_to_string(header).unwrap();

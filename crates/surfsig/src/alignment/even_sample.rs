@@ -1,15 +1,14 @@
 //! Some points of a surface, spread evenly over it however dense its parts are.
 
 use crate::kd_tree::KdTree;
-use crate::voxels::voxel_of;
+use crate::voxels::Voxels;
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
 
 /// Points that are drawn first by the density of their voxels, in those that are wanted: the neighbours among them
 /// tell the area around each.
-const DRAWN: usize = 4;
+const DRAWN: usize = 2;
 /// Nearest points that tell the area around one.
-const NEIGHBORS: usize = 10;
+const NEIGHBORS: usize = 8;
 /// Of the largest area, what a point stands for at least: equal points have none.
 const SMALLEST_AREA: f64 = 1e-9;
 
@@ -21,8 +20,9 @@ const SMALLEST_AREA: f64 = 1e-9;
 pub(crate) fn even_sample(points: &[[f64; 3]], count: usize, voxel: f64) -> Vec<[f64; 3]> {
     let mut drawn: Vec<usize> = (0..points.len()).collect();
     if points.len() > DRAWN * count {
-        let in_voxel = VoxelCounts::new(points, voxel);
-        drawn = smallest(drawn, DRAWN * count, |i| -uniform(i, 0).ln() * in_voxel.count(&points[i]));
+        let voxels = Voxels::new(points, voxel);
+        let in_voxel = |i: usize| f64::from(voxels.counts[voxels.numbers[i] as usize]);
+        drawn = smallest(drawn, DRAWN * count, |i| -uniform(i, 0).ln() * in_voxel(i));
     }
     let drawn: Vec<[f64; 3]> = drawn.into_iter().map(|i| points[i]).collect();
     if drawn.len() <= count {
@@ -39,26 +39,6 @@ pub(crate) fn even_sample(points: &[[f64; 3]], count: usize, voxel: f64) -> Vec<
     // The keys -ln(u) / weight, the smallest ones: Efraimidis and Spirakis, Weighted random sampling (2006).
     let chosen = smallest((0..drawn.len()).collect(), count, |i| -uniform(i, 1).ln() / weight(i));
     chosen.into_iter().map(|i| drawn[i]).collect()
-}
-
-/// How many points each voxel holds.
-struct VoxelCounts {
-    voxel: f64,
-    counts: FxHashMap<[i64; 3], u32>,
-}
-
-impl VoxelCounts {
-    fn new(points: &[[f64; 3]], voxel: f64) -> Self {
-        let mut counts = FxHashMap::default();
-        for point in points {
-            *counts.entry(voxel_of(point, voxel)).or_insert(0) += 1;
-        }
-        Self { voxel, counts }
-    }
-
-    fn count(&self, point: &[f64; 3]) -> f64 {
-        f64::from(self.counts[&voxel_of(point, self.voxel)])
-    }
 }
 
 /// The `count` numbers of the smallest keys, in ascending order.

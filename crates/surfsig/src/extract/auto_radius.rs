@@ -13,6 +13,9 @@ const FEWEST: u32 = 16;
 /// Most points of a ball: errors are then small, and a ball that is more would only be slower.
 const MOST: u32 = 10_000;
 
+/// Passes from a radius of one unit beyond which no radius is valid.
+const LIMIT: f64 = 200.0;
+
 /// Radii that are tried in one pass, of which the next pass repeats the last.
 const STEPS: i32 = 5;
 
@@ -67,10 +70,11 @@ pub fn extract_auto_radius(
         let step = 2.0 * nearest.max(1e-9 * largest.max(1e-6)).log2();
         // Passes are counted from a radius of one unit, so that where the first begins costs time, and changes nothing
         // but how far the last one reaches.
-        let first = (step / f64::from(STEPS - 1)).floor() as i32;
+        // Beyond its limits no radius is valid, which the first pass then says.
+        let first = (step / f64::from(STEPS - 1)).floor().clamp(-LIMIT, LIMIT) as i32;
         let mut climb = Climb { cloud, queries, options, monitor, lowest: first - PASSES_BELOW, found: None };
         climb.from(first, (0..queries.len(cloud)).collect())?;
-        let (mut best, _) = climb.found.ok_or(Error::Cancelled)?;
+        let (mut best, _) = climb.found.expect("the first pass has found something for all");
         best.mark_too_coarse(cloud, queries);
         Ok(best)
     })?

@@ -79,6 +79,7 @@ fn registered(
     if source.points.len().min(target.points.len()) < settings.min_points || radius == 0.0 {
         return Ok(Registration::nothing(radius, 0));
     }
+    let patch = Radius::new(radius)?;
     let [from_source, to_target] =
         [source.center, target.center].map(|center| RigidTransform::from_rotation_vector([0.0; 3], center));
     let (proposed, matches) = match start {
@@ -87,7 +88,9 @@ fn registered(
             (to_target.inverse() * *start * from_source, None)
         }
         None => {
-            let matches = matched(source, target, Radius::new(radius)?, settings, monitor)?;
+            let thinned =
+                [source, target].map(|scan| scan.thinned(radius / settings.description_voxels_per_radius));
+            let matches = matched(&thinned[0], &thinned[1], patch, settings, monitor)?;
             if matches.len() < 3 {
                 return Ok(Registration::nothing(radius, matches.len()));
             }

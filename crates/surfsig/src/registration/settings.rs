@@ -20,6 +20,9 @@ pub struct RegistrationSettings {
     /// Candidates for keypoints along a patch's radius. With 4 to 8 as many poses of redkitchen, bunny and lidar are
     /// right (`benchmarks/registration.py`); with 5 most matches agree, and 8 takes twice the time.
     pub candidates_per_radius: f64,
+    /// Voxels along a patch's radius, to which scans are thinned before their patches are described: the curvature of
+    /// a patch is taken from balls of a quarter of its radius, which then hold some hundred means.
+    pub description_voxels_per_radius: f64,
     /// Voxels along a patch's radius, to which scans are thinned before they are refined.
     pub voxels_per_radius: f64,
     /// The same where normals are oriented by their neighbours, because no viewpoint is known.
@@ -57,6 +60,7 @@ impl Default for RegistrationSettings {
             radius_share: 0.4,
             keypoints: 1000,
             candidates_per_radius: 5.0,
+            description_voxels_per_radius: 24.0,
             voxels_per_radius: 16.0,
             orientation_voxels_per_radius: 10.0,
             consensus: ConsensusSettings::default(),

@@ -37,7 +37,13 @@ def printed_matrix() -> np.ndarray:
     return zeta
 
 
-@pytest.mark.parametrize("vocabulary", VOCABULARIES)
+@pytest.mark.parametrize(
+    "vocabulary",
+    [
+        pytest.param(one, marks=() if number >= 2 else pytest.mark.slow)
+        for number, one in enumerate(VOCABULARIES)
+    ],
+)
 def test_signatures_have_the_zeta_of_equation_two(vocabulary: Vocabulary) -> None:
     units = SURFACES * np.array([SIDE, SIDE, 1, 1, SIDE, 1 / SIDE])
     c = np.array([vocabulary.frame.coefficients(surface) for surface in units])

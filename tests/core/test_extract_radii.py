@@ -118,6 +118,7 @@ def test_chosen_radii_are_powers_and_reported() -> None:
     assert "radius" in s.columns()
 
 
+@pytest.mark.slow
 def test_balls_stop_at_an_edge_and_at_the_other_side_of_a_plate() -> None:
     rng = np.random.default_rng(SEED)
     xy = rng.uniform(-10, 10, (40_000, 2))
@@ -134,6 +135,7 @@ def test_balls_stop_at_an_edge_and_at_the_other_side_of_a_plate() -> None:
     assert (np.asarray(s.radius) <= 1.001).mean() > 0.995
 
 
+@pytest.mark.slow
 def test_a_chosen_radius_does_not_depend_on_threads_scale_or_what_is_far_away() -> None:
     points = bumps(30_000)
     s = extract(points, "auto", threads=1)

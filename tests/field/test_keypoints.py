@@ -62,6 +62,7 @@ def test_where_many_are_asked_for_flat_places_get_some_too() -> None:
     assert np.mean(found.points[:, 0] < 2.0 - RADIUS) > 0.3
 
 
+@pytest.mark.slow
 def test_of_keypoints_more_matches_are_right_than_of_random_points() -> None:
     points = scan()
     rng = np.random.default_rng(2)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import surface_scenes
 from conftest import Finished
+from drawn_shapes import sphere
 from recurrence_scene import SCANNER, recurrence_scene
 from surface_points import Array
 from test_cli_errors import one_line
@@ -117,6 +118,20 @@ def test_mistakes(shell: Shell, scan: Path, options: tuple[str, str], message: s
     assert message in one_line(shell("surfaces", scan, *options))
 
 
+def test_two_balls_recur(shell: Shell, tmp_path: Path) -> None:
+    rng = np.random.default_rng(52)
+    balls = [0.5 * sphere(rng, 0.0, 0.002, 600) + [x, 0, 0] for x in (0.0, 2.0)]
+    scan = tmp_path / "scan.pcd"
+    surfsig.write(scan, PointCloud(np.concatenate(balls), viewpoint=np.array([1.0, 0.0, 30.0])))
+    finished = shell("surfaces", scan, "--recurrences", "--kinds", "sphere", "--json", "-")
+    assert (finished.code, finished.err) == (0, "")
+    values = json.loads(finished.out)["recurrences"]
+    assert [[member["piece"] for member in group["members"]] for group in values["groups"]] == [[0, 1]]
+    (equal,) = values["equal_surfaces"]
+    assert equal["size"]["radius"] == pytest.approx(0.5, abs=1e-3)
+
+
+@pytest.mark.slow
 def test_what_recurs(shell: Shell, tmp_path: Path) -> None:
     scene = recurrence_scene(7, columns=2, rows=2, kinds=("large ball",))
     path, labelled = tmp_path / "scan.pcd", tmp_path / "labelled.npz"

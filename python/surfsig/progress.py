@@ -1,10 +1,11 @@
-"""Telling a caller how far reading or writing has come."""
+"""Telling a caller how far work has come."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 ProgressCallback = Callable[[int, int], object]
+"""Called with what is done and with all that there is to do; an exception that it raises stops the work."""
 
 
 class Progress:
@@ -13,8 +14,7 @@ class Progress:
     Parameters
     ----------
     callback
-        Called with two whole numbers (bytes where a file is read, points where one is written); an
-        exception that it raises stops the work.
+        Called with two whole numbers: bytes where a file is read, points where one is written.
     total
         The second of the two.
     """

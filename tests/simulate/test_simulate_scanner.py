@@ -181,7 +181,7 @@ def test_seeds() -> None:
     assert (a.points[:, 2] != c.points[:, 2]).mean() > 0.7
 
 
-@pytest.mark.parametrize("centre", [(0.0, 0.0), (0.03, -0.02)])
+@pytest.mark.parametrize("centre", [(0.0, 0.0), pytest.param((0.03, -0.02), marks=pytest.mark.slow)])
 def test_a_bump_towards_the_sensor_has_positive_second_derivatives(centre: tuple[float, float]) -> None:
     radius = 0.03
     cloud = replace(EXACT, column_step=2, sheet_step=2e-4).scan(
@@ -201,6 +201,7 @@ def test_a_bump_towards_the_sensor_has_positive_second_derivatives(centre: tuple
     assert cloud.viewpoint[2] == pytest.approx(-0.12 / np.sin(np.radians(25)) / np.cos(np.radians(25)))
 
 
+@pytest.mark.slow
 def test_part_has_its_surfaces_and_curvatures() -> None:
     scene = sim.part_scene()
     cloud = sim.part(3, truth=True)

@@ -18,14 +18,14 @@ from surfsig.recurrences.matching import common_share
 from surfsig.recurrences.pieces import pieces_of
 from surfsig.recurrences.point_pairs import PointPairs, proposed_poses
 from surfsig.recurrences.shadows import Region, direction_of_sensor, places_without_points, second_place
+from surfsig.shapes.surface import PARAMETERS, Kind, measured_surface
 from surfsig.spacing import point_spacing
 from surfsig.surfaces import Surface, Surfaces
-from surfsig.surfaces.surface import described
 
 Array = NDArray[np.float64]
 
 
-def surface(kind: str, radius: float, std: float, *, axis: Array | None = None, **sizes: float) -> Surface:
+def surface(kind: Kind, radius: float, std: float, *, axis: Array | None = None, **sizes: float) -> Surface:
     """Make a surface at a place that depends on its radius."""
     place = np.array([radius, 2.0, 3.0])
     entry = {
@@ -33,16 +33,13 @@ def surface(kind: str, radius: float, std: float, *, axis: Array | None = None, 
         "point": place,
         "axis": np.array([0.0, 0.0, 1.0]) if axis is None else axis,
         "radius": radius,
-        "radius_std": std,
         "major_radius": sizes.get("major_radius", np.nan),
-        "major_radius_std": std,
         "half_angle": sizes.get("half_angle", np.nan),
-        "half_angle_std": std,
         "deviation": 1e-4,
-        "count": 12,
+        "covariance": std**2 * np.eye(len(PARAMETERS[kind])),
     }
     points = np.random.default_rng(0).normal(size=(12, 3))
-    made = described(entry, points, np.zeros(3))
+    made = measured_surface(entry, points, np.zeros(3), np.arange(12))
     return dataclasses.replace(made, center=place)
 
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drawn_shapes import sphere
 from recurrence_scene import RecurrenceScene, recurrence_scene
 from recurrences import scored
+from surface_points import Array
 
 import surfsig
 
+BESIDE = np.array([2.0, 0.0, 0.0])
 KINDS = ("large ball", "small ball", "bracket", "egg")
 
 
@@ -30,6 +33,7 @@ def objects_of(scene: RecurrenceScene, found: surfsig.Recurrences, group: int) -
     return [int(np.bincount(scene.object_of_point[part]).argmax()) for part in points]
 
 
+@pytest.mark.slow
 def test_groups_are_the_kinds(scene: RecurrenceScene, found: surfsig.Recurrences) -> None:
     score = scored(scene, found)
     # One bracket shows a side that no other shows: it stays alone.
@@ -38,6 +42,7 @@ def test_groups_are_the_kinds(scene: RecurrenceScene, found: surfsig.Recurrences
     assert len(found) == len(KINDS)
 
 
+@pytest.mark.slow
 def test_poses_of_an_object_without_symmetry(scene: RecurrenceScene, found: surfsig.Recurrences) -> None:
     for number, group in enumerate(found.groups):
         objects = objects_of(scene, found, number)
@@ -54,6 +59,7 @@ def test_poses_of_an_object_without_symmetry(scene: RecurrenceScene, found: surf
     pytest.fail("no group of brackets")
 
 
+@pytest.mark.slow
 def test_a_ball_has_no_orientation(scene: RecurrenceScene, found: surfsig.Recurrences) -> None:
     balls = 0
     for number, group in enumerate(found.groups):
@@ -63,7 +69,7 @@ def test_a_ball_has_no_orientation(scene: RecurrenceScene, found: surfsig.Recurr
             continue
         balls += 1
         (turn,) = group.free_directions
-        assert str(turn).startswith("turns about (")
+        assert str(turn).startswith("rotates about (")
         np.testing.assert_allclose(turn.point, scene.poses[objects[0]][:3, 3], atol=1e-3)
         for pose, member in zip(group.poses, objects, strict=True):
             center = pose @ scene.poses[objects[0]][:, 3]
@@ -71,6 +77,7 @@ def test_a_ball_has_no_orientation(scene: RecurrenceScene, found: surfsig.Recurr
     assert balls == 2
 
 
+@pytest.mark.slow
 def test_labels_table_and_words(scene: RecurrenceScene, found: surfsig.Recurrences) -> None:
     (labels,), (groups,) = found.labels, found.group_labels
     assert labels.shape == groups.shape == (len(scene.cloud),)
@@ -86,6 +93,7 @@ def test_labels_table_and_words(scene: RecurrenceScene, found: surfsig.Recurrenc
     assert repr(found).startswith(f"Recurrences({len(table)} of {len(found.pieces)} pieces in 4 groups")
 
 
+@pytest.mark.slow
 def test_the_same_scan_twice_and_shifted(scene: RecurrenceScene) -> None:
     """Between scans, poses are in true coordinates: here the shift between two copies of a scan."""
     one = scene.cloud.at(np.flatnonzero(np.isin(scene.object_of_point, range(4))))
@@ -107,6 +115,7 @@ def test_the_same_scan_twice_and_shifted(scene: RecurrenceScene) -> None:
             pytest.fail(f"{group} does not find its copy")
 
 
+@pytest.mark.slow
 def test_the_same_result_every_time(scene: RecurrenceScene) -> None:
     few = scene.cloud.at(np.flatnonzero(np.isin(scene.object_of_point, range(4))))
     one, other = (surfsig.find_recurrences(surfsig.find_surfaces(few)) for _ in range(2))
@@ -119,17 +128,46 @@ def test_a_scan_without_pieces() -> None:
     assert len(found.to_pandas()) == 0
 
 
-def test_unknown_viewpoints_and_other_input(scene: RecurrenceScene) -> None:
-    few = scene.cloud.at(np.flatnonzero(np.isin(scene.object_of_point, range(4))))
-    blind = surfsig.PointCloud(few.offsets)
+def two_balls(origin: Array, viewpoint: Array | None) -> surfsig.Surfaces:
+    """Find the surfaces of halves of two balls of radius 0.5 at 0 and (2, 0, 0) from an origin."""
+    rng = np.random.default_rng(53)
+    points = np.concatenate([0.5 * sphere(rng, 0.0, 0.002, 600), 0.5 * sphere(rng, 0.0, 0.002, 600) + BESIDE])
+    cloud = surfsig.PointCloud(points, origin=origin, viewpoint=viewpoint)
+    return surfsig.find_surfaces(cloud, kinds=["sphere"])
+
+
+def test_two_balls_in_two_scans_are_four_of_a_kind() -> None:
+    """Poses are in true coordinates, between scans, too, and known but for rotations about the center."""
+    far = np.array([500_000.0, 4_500_000.0, 3.0])
+    scans = [two_balls(origin, origin + np.array([1.0, 0.0, 30.0])) for origin in (np.zeros(3), far)]
+    found = surfsig.find_recurrences(scans)
+    assert [piece.scan for piece in found.pieces] == [0, 0, 1, 1]
+    (group,) = found.groups
+    assert sorted(group.pieces) == [0, 1, 2, 3]
+    for member, pose in zip(group.pieces, group.poses, strict=True):
+        first, other = (
+            scans[found.pieces[number].scan][found.pieces[number].surfaces[0]]
+            for number in (group.pieces[0], member)
+        )
+        np.testing.assert_allclose(pose[:3, :3] @ first.center + pose[:3, 3], other.center, atol=5e-3)
+    (turn,) = group.free_directions
+    assert str(turn).startswith("rotates about (")
+    (equal,) = found.equal_surfaces
+    assert len(equal) == 4
+    assert equal.size["radius"] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_unknown_viewpoints_and_other_input() -> None:
+    known = two_balls(np.zeros(3), np.array([1.0, 0, 30]))
     with pytest.raises(surfsig.InvalidInputError, match="set the cloud's viewpoint"):
-        surfsig.find_recurrences(surfsig.find_surfaces(blind))
-    with pytest.raises(surfsig.InvalidInputError, match=r"what surfsig\.surfaces returns"):
-        surfsig.find_recurrences([few])  # type: ignore[list-item]
+        surfsig.find_recurrences(two_balls(np.zeros(3), None))
+    with pytest.raises(surfsig.InvalidInputError, match=r"what surfsig\.find_surfaces returns"):
+        surfsig.find_recurrences([known.cloud])  # type: ignore[list-item]
     with pytest.raises(surfsig.InvalidInputError, match="min_points"):
-        surfsig.find_recurrences(surfsig.find_surfaces(few), min_points=0)
+        surfsig.find_recurrences(known, min_points=0)
 
 
+@pytest.mark.slow
 def test_without_a_viewpoint_shadows_tell(scene: RecurrenceScene) -> None:
     blind = surfsig.PointCloud(scene.cloud.offsets)
     with pytest.warns(UserWarning, match="where shadows point to"):

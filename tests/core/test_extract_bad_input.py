@@ -257,3 +257,10 @@ def test_each_place_has_a_radius_where_no_point_is_finite(points: Any, size: dic
     assert isinstance(result.radius, np.ndarray)
     assert result.radius.shape == (len(points),)
     assert result.columns()["radius"].shape == (len(points),)
+
+
+def test_coordinates_too_large_for_any_radius_are_said() -> None:
+    """They were once reported as a stop by the caller."""
+    points = np.array([[1e300, 0.0, 0.0], [-1e300, 1.0, 0.0], [0.0, 1e300, 0.0], [0.0, 0.0, 1e300]])
+    with pytest.raises(InvalidInputError, match="radius"):
+        extract(points, radius="auto")

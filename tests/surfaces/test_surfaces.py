@@ -10,7 +10,7 @@ from surface_points import UTM, rotation
 
 import surfsig
 from surfsig import InvalidInputError, PointCloud, Surfaces
-from surfsig.surfaces.surface import described
+from surfsig.shapes.surface import measured_surface
 
 
 def agreement(found: Surfaces, owners: NDArray[np.intp]) -> float:
@@ -79,7 +79,7 @@ def test_distances_are_those_of_the_members(scene: surface_scenes.Known, found: 
     ball = found[2]
     expected = np.linalg.norm(scene.points - ball.center, axis=1) - ball.radius
     np.testing.assert_allclose(ball.distances(scene.points), expected, atol=1e-12)
-    own = ball.distances(scene.points[found.members(2)])
+    own = ball.distances(scene.points[found[2].members])
     assert np.sqrt((own**2).mean()) == pytest.approx(ball.rms)
     assert len(own) == ball.count
 
@@ -127,9 +127,9 @@ def test_points_have_the_class_of_their_surface(scene: surface_scenes.Known, fou
     kinds = np.array([surfsig.PointClass[surface.kind.upper()] for surface in found])
     inside = found.labels >= 0
     np.testing.assert_array_equal(found.classes[inside], kinds[found.labels[inside]])
-    distances = abs(found[2].distances(scene.points[found.members(2)])) / found[2].deviation
+    distances = abs(found[2].distances(scene.points[found[2].members])) / found[2].deviation
     expected = 1 / (1 + np.exp((distances**2 - 9) / 2))
-    np.testing.assert_allclose(found.confidence[found.members(2)], expected, atol=1e-6)
+    np.testing.assert_allclose(found.confidence[found[2].members], expected, atol=1e-6)
     assert (found.confidence >= 0).all()
     assert (found.confidence <= 1).all()
 
@@ -188,7 +188,7 @@ def test_fields_for_files_and_tables(found: Surfaces) -> None:
     np.testing.assert_array_equal(columns["surface_kind"] > 0, found.labels >= 0)
     colors = np.unique(found.colors, axis=0)
     assert len(colors) == len(found) + 1
-    assert len(np.unique(found.colors[found.members(0)], axis=0)) == 1
+    assert len(np.unique(found.colors[found[0].members], axis=0)) == 1
     frame = pytest.importorskip("pandas") and found.to_pandas()
     assert list(frame.kind) == ["plane", "cylinder", "sphere"]
     assert frame.radius[2] == found[2].radius
@@ -220,9 +220,11 @@ def test_the_errors_of_the_core_are_given_on() -> None:
     towards = rng.normal(size=(500, 3))
     towards /= np.linalg.norm(towards, axis=1)[:, None]
     nothing = {"axis": np.full(3, np.nan), "major_radius": np.nan, "half_angle": np.nan}
-    core = {"kind": "sphere", "point": UTM, "radius": 2.0, "deviation": 0.1, "count": 500, **nothing}
-    errors = {"radius_std": 0.01, "freedom": 10.0, "covariance": np.diag([1e-4, 1e-4, 1e-4, 1e-4])}
-    sphere = described({**core, **errors}, 2.1 * towards, UTM)
+    core = {"kind": "sphere", "point": UTM, "radius": 2.0, "deviation": 0.1, **nothing}
+    errors = {"freedom": 10.0, "covariance": np.diag([1e-4, 1e-4, 1e-4, 1e-4])}
+    members = np.arange(500)
+    sphere = measured_surface({**core, **errors}, 2.1 * towards, UTM, members)
+    assert sphere.radius_std == 0.01
     # t of 10 degrees of freedom at 0.975.
     assert sphere.interval == pytest.approx((2 - 0.0222814, 2 + 0.0222814), abs=1e-6)
     assert sphere.rms == pytest.approx(0.1)
@@ -230,9 +232,9 @@ def test_the_errors_of_the_core_are_given_on() -> None:
     np.testing.assert_array_equal(sphere.covariance, errors["covariance"])
     (row,) = Surfaces(PointCloud(2.1 * towards, UTM), np.zeros(500, np.int32), [sphere]).table()[1]
     assert row[2:4] == ("2.000", "1.978 to 2.022")
-    assert sphere.values()["interval"] == sphere.interval
-    assert "major_radius" not in sphere.values()
-    without = described(core, 2.1 * towards, UTM)
+    assert sphere.to_dict()["interval"] == sphere.interval
+    assert "major_radius" not in sphere.to_dict()
+    without = measured_surface(core, 2.1 * towards, UTM, members)
     assert math.isnan(without.radius_std)
     assert without.covariance.shape == (4, 4)
     assert np.isnan(without.covariance).all()

@@ -9,7 +9,7 @@ import pytest
 
 from surfsig.errors import FileFormatError
 from surfsig.files import lines, read
-from surfsig.files.progress import Progress
+from surfsig.progress import Progress
 
 POINTS = np.array([[-1.5, 2.25, 3.0625], [4.125, -5.5, 6.75], [7.5, 8.5, -9.25], [0.5, 1.25, -0.75]] * 3)
 

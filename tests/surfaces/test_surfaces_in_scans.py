@@ -20,6 +20,7 @@ def found_in(path: Path, kind: str, near: float) -> Surface:
     return min(candidates, key=lambda surface: abs(surface.radius - near))
 
 
+@pytest.mark.slow
 def test_the_mug(shared_data: Path) -> None:
     """PCL fits 0.0396 to it; towards its foot the camera rounds it off, and it has a handle."""
     found = surfsig.find_surfaces(surfsig.read(shared_data / "surfaces" / "table_scene_mug.pcd"))
@@ -38,6 +39,7 @@ def test_the_lidar_sphere(shared_data: Path, number: int) -> None:
     assert sphere.count > 100
 
 
+@pytest.mark.slow
 def test_three_scans_of_one_sphere_agree_within_their_intervals(shared_data: Path) -> None:
     scans = [shared_data / "surfaces" / f"lidar_sphere_{number}.xyz" for number in (1, 2, 3)]
     spheres = [found_in(scan, "sphere", 0.295) for scan in scans]
@@ -56,6 +58,7 @@ def test_the_gym_ball(shared_data: Path) -> None:
     assert ball.count > 3000
 
 
+@pytest.mark.slow
 def test_tables_are_not_mixed_nor_in_pieces(shared_data: Path) -> None:
     scenes = read_tables(shared_data)
     found = [surfsig.find_surfaces(scene.cloud) for scene in scenes]
@@ -69,6 +72,7 @@ def test_tables_are_not_mixed_nor_in_pieces(shared_data: Path) -> None:
     assert total.segments / total.objects < 3
 
 
+@pytest.mark.slow
 def test_equal_cans_have_equal_radii(shared_data: Path) -> None:
     """Two cans stand on one of the tables; nobody says how large they are, but they are of one size."""
     scene = next(each for each in read_tables(shared_data) if each.name == "learn33")
@@ -83,6 +87,7 @@ def test_equal_cans_have_equal_radii(shared_data: Path) -> None:
     assert max(can.interval[0] for can in cans) < min(can.interval[1] for can in cans)
 
 
+@pytest.mark.slow
 def test_what_may_be_a_plane_is_no_sphere(shared_data: Path) -> None:
     """Part of the clutter behind the mug was a sphere of radius 0.17 +- 0.15."""
     found = surfsig.find_surfaces(surfsig.read(shared_data / "surfaces" / "table_scene_mug.pcd"))

@@ -63,10 +63,16 @@ def covered_arc(placement: Placement, points: Array) -> float:
     if placement.kind == "plane":
         return math.nan
     if placement.kind == "sphere":
-        towards = points / np.linalg.norm(points, axis=1, keepdims=True)
+        towards = directions_of(points)
         return 2 * float(np.arccos(np.clip(towards @ middle_direction(towards), -1, 1)).max())
     turns = np.sort(placement.turns(points))
     return 2 * math.pi - float(np.diff(turns, append=turns[0] + 2 * math.pi).max())
+
+
+def directions_of(points: Array) -> Array:
+    """Give unit vectors (n, 3) from 0 to points; 0 for a point that is there."""
+    lengths = np.linalg.norm(points, axis=1, keepdims=True)
+    return np.asarray(points / np.where(lengths > 0.0, lengths, 1.0))
 
 
 def middle_direction(towards: Array) -> Array:
@@ -80,12 +86,17 @@ def middle_direction(towards: Array) -> Array:
 def in_plane(placement: Placement, points: Array) -> tuple[float, float]:
     """Measure the sides of the smallest rectangle around points in a plane, the longer first.
 
-    One of its sides is along the convex hull.
+    One of its sides is along the convex hull; of points that are nearly on a line, along that line.
     """
-    from scipy.spatial import ConvexHull
+    from scipy.spatial import ConvexHull, QhullError
 
     flat = points @ np.column_stack(axes_across(placement.axis))
-    hull = flat[ConvexHull(flat).vertices]
+    try:
+        hull = flat[ConvexHull(flat).vertices]
+    except QhullError:
+        _, _, directions = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)
+        longer, shorter = np.ptp(flat @ directions.T, axis=0).tolist()
+        return longer, shorter
     edges = np.diff(hull, axis=0, append=hull[:1])
     edges /= np.linalg.norm(edges, axis=1, keepdims=True)
     along = np.ptp(hull @ edges.T, axis=0)

@@ -7,13 +7,16 @@ import math
 import numpy as np
 
 from surfsig.geometry import axes_across
-from surfsig.surfaces.geometry import Array, Placement, middle_direction
+from surfsig.shapes.geometry import Array, Placement, directions_of, middle_direction
 
 _POINTS = 20_000
 """Points that are looked at; of more, evenly chosen ones."""
 
 _NEIGHBOURS = 32
 """A cell is as wide as it is far to so many neighbours: hardly any is then empty by chance."""
+
+_FINEST = 2.0**-30
+"""Width of the narrowest cells, in extents of the points: two such numbers of cells fit into 64 bits."""
 
 
 def covered_area(placement: Placement, points: Array) -> float:
@@ -36,7 +39,8 @@ def covered_area(placement: Placement, points: Array) -> float:
     some = flat[:: math.ceil(len(flat) / 1000)]
     reach, _ = KDTree(flat).query(some, [min(_NEIGHBOURS, max(4, len(flat) // 8))])
     side = float(np.median(reach))
-    if not side > 0:
+    # Cells have whole numbers, and points that are nearly all at one position tell no width of cells.
+    if not side > _FINEST * float(np.ptp(flat, axis=0).max()):
         return math.nan
     # By half a cell the lowest points are inside of theirs, so that these are half covered, too.
     cells = np.unique(np.floor((flat - flat.min(axis=0)) / side + 0.5).astype(np.int64), axis=0)
@@ -70,7 +74,7 @@ def unrolled(placement: Placement, points: Array) -> Array:
 
 def _lambert(radius: float, points: Array) -> Array:
     """Map a sphere about the middle of its points (Lambert's azimuthal map)."""
-    towards = points / np.linalg.norm(points, axis=1, keepdims=True)
+    towards = directions_of(points)
     middle = middle_direction(towards)
     flat = towards @ np.column_stack(axes_across(middle))
     scale = np.sqrt(2 / np.maximum(1 + towards @ middle, 1e-9))

@@ -43,6 +43,7 @@ def report(folder: Path) -> dict[str, Any]:
     return values
 
 
+@pytest.mark.slow
 def test_files(folder: Path) -> None:
     assert {p.stem for p in folder.glob("*.png")} == PICTURES
     for picture in folder.glob("*.png"):
@@ -55,10 +56,12 @@ def test_files(folder: Path) -> None:
     }
 
 
+@pytest.mark.slow
 def test_json_on_stdout_is_the_file(folder: Path, report: dict[str, Any]) -> None:
     assert json.loads((folder / "stdout").read_text()) == report
 
 
+@pytest.mark.slow
 def test_decisions(report: dict[str, Any]) -> None:
     counts = report["decisions"]
     assert (counts["of_positives"], counts["of_negatives"]) == (8, 49)
@@ -79,6 +82,7 @@ def test_decisions(report: dict[str, Any]) -> None:
     assert [row["scale"] for row in report["sweep"]] == [0.0, 0.5, 1.0, 2.0]
 
 
+@pytest.mark.slow
 def test_table_one_holds_with_the_power_three_halves_only(report: dict[str, Any]) -> None:
     plane, cylinder, sphere = report["tables"]["I"]
     assert (plane["K"]["value"], plane["H"]["value"]) == (0.0, 0.0)
@@ -92,6 +96,7 @@ def test_table_one_holds_with_the_power_three_halves_only(report: dict[str, Any]
         assert row["H_scanned"]["median"] == pytest.approx(row["H"]["value"], rel=0.05)
 
 
+@pytest.mark.slow
 def test_tables_two_and_three(report: dict[str, Any]) -> None:
     two = {row["parameter"]: row for row in report["tables"]["II"]}
     for name in "abcdf":
@@ -105,6 +110,7 @@ def test_tables_two_and_three(report: dict[str, Any]) -> None:
     assert three[13]["k1"]["median"] > 90 > three[13]["true_curvature"]
 
 
+@pytest.mark.slow
 def test_random_poses(report: dict[str, Any]) -> None:
     paper, own, own_half = report["random_poses"]
     assert paper["self_similarity"]["cylinder"] < 0.5
@@ -116,6 +122,7 @@ def test_random_poses(report: dict[str, Any]) -> None:
     assert np.sum(own_half["confusion"]["shares"], axis=1) == pytest.approx(np.ones(11))
 
 
+@pytest.mark.slow
 def test_csv_holds_the_tables(folder: Path, report: dict[str, Any]) -> None:
     with (folder / "tables.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -129,6 +136,7 @@ def test_csv_holds_the_tables(folder: Path, report: dict[str, Any]) -> None:
     assert {row["table"] for row in rows} >= {"I", "II", "III", "frame", "random poses"}
 
 
+@pytest.mark.slow
 def test_the_page_needs_nothing_else(folder: Path) -> None:
     page = (folder / "index.html").read_text()
     assert page.count('src="data:image/png;base64,') == len(PICTURES)

@@ -1,0 +1,61 @@
+//! Registration.
+
+use crate::*;
+use std::mem::MaybeUninit;
+
+unsafe extern "C" fn stop(_data: *mut c_void, _done: usize, _total: usize) -> c_int {
+    1
+}
+
+pub fn registration_options(called: &mut Called) {
+    call!(called, surfsig_registration_options_set_radius(None, 1.0) gives INVALID);
+    call!(called, surfsig_registration_options_set_keypoints(None, 1) gives INVALID);
+    call!(called, surfsig_registration_options_set_threads(None, 1) gives INVALID);
+    call!(called, surfsig_registration_options_set_progress(None, Some(stop), null_mut()) gives INVALID);
+    call!(called, surfsig_registration_options_free(None));
+    let mut options = call!(called, surfsig_registration_options_new());
+    for radius in [-1.0, f64::NAN, f64::INFINITY, 1e300] {
+        call!(called, surfsig_registration_options_set_radius(Some(&mut options), radius) gives INVALID);
+    }
+    call!(called, surfsig_registration_options_set_threads(Some(&mut options), 1025) gives INVALID);
+    call!(called, surfsig_registration_options_set_radius(Some(&mut options), 0.0) gives OK);
+    call!(called, surfsig_registration_options_set_keypoints(Some(&mut options), 0) gives OK);
+    call!(called, surfsig_registration_options_free(Some(options)));
+}
+
+pub fn registrations(called: &mut Called) {
+    let clouds: Vec<Cloud> = odd_clouds().iter().map(|points| Cloud::of(points)).collect();
+    let scan = |cloud: &Cloud| surfsig_scan { cloud: cloud.0, viewpoint: null(), directions: null() };
+    let mut room = MaybeUninit::<surfsig_registration>::uninit();
+    let out = room.as_mut_ptr();
+    let surface = Cloud::of(&wave());
+    let good = scan(&surface);
+    let none = surfsig_scan { cloud: null(), ..good };
+    call!(called, surfsig_register(null(), &good, null(), None, out) gives INVALID);
+    call!(called, surfsig_register(&good, null(), null(), None, out) gives INVALID);
+    call!(called, surfsig_register(&good, &none, null(), None, out) gives INVALID);
+    call!(called, surfsig_register(&good, &good, null(), None, null_mut()) gives INVALID);
+    let nowhere = surfsig_scan { viewpoint: BAD.as_ptr(), ..good };
+    call!(called, surfsig_register(&nowhere, &good, null(), None, out) gives INVALID);
+    let wrong = surfsig_transform { matrix: BAD };
+    call!(called, surfsig_register(&good, &good, &wrong, None, out) gives INVALID);
+    let viewpoint = [0.0, 0.0, 9.0];
+    let facing = vec![[f32::NAN; 3]; 1 << 16];
+    let identity = surfsig_transform_identity();
+    for cloud in &clouds {
+        let seen = surfsig_scan { viewpoint: viewpoint.as_ptr(), ..scan(cloud) };
+        let facing = surfsig_scan { directions: facing.as_ptr().cast(), ..scan(cloud) };
+        let both = surfsig_scan { viewpoint: viewpoint.as_ptr(), ..facing };
+        call!(called, surfsig_register(&both, &good, null(), None, out) gives INVALID);
+        for (source, start) in [(seen, null()), (facing, null()), (seen, &raw const identity)] {
+            let code = call!(called, surfsig_register(&source, &good, start, None, out));
+            assert!([OK, INVALID].contains(&code), "{}", last_error());
+            if code == OK {
+                let found = unsafe { room.assume_init_ref() };
+                assert_eq!(found.found, found.T_target_source.matrix[0].is_finite());
+                assert!(found.free_direction_count <= SURFSIG_FREE_DIRECTIONS);
+                assert!(found.found || !found.trusted);
+            }
+        }
+    }
+}

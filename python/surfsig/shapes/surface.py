@@ -1,0 +1,279 @@
+"""A fitted surface: what it is, where, how large, and how sure that is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfsig.alignment.free_directions import FreeDirection, free_directions_of_surface
+from surfsig.defaults import INTERVAL
+from surfsig.digits import with_error
+from surfsig.point_cloud import PointCloud
+from surfsig.shapes.area import covered_area
+from surfsig.shapes.geometry import Array, Placement, covered_arc, in_plane
+
+Kind = Literal["plane", "sphere", "cylinder", "cone", "torus"]
+"""What a surface is."""
+
+KINDS: tuple[Kind, ...] = get_args(Kind)
+"""All kinds, the simplest first."""
+
+_SHIFTS_AND_TILTS = ("shift_1", "shift_2", "tilt_1", "tilt_2")
+
+PARAMETERS: dict[Kind, tuple[str, ...]] = {
+    "plane": ("shift", "tilt_1", "tilt_2"),
+    "sphere": ("x", "y", "z", "radius"),
+    "cylinder": (*_SHIFTS_AND_TILTS, "radius"),
+    "cone": (*_SHIFTS_AND_TILTS, "radius", "half_angle"),
+    "torus": (*_SHIFTS_AND_TILTS, "shift", "major_radius", "radius"),
+}
+"""The parameters of each kind, in the order of `Surface.covariance`: x, y, z of the point; `shift` along the
+axis (of a plane, along its normal); `shift_1` and `shift_2` along the rows of `across`; `tilt_1` and
+`tilt_2`, by which the end of the axis moves along these rows, in radians; and the sizes."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Surface:
+    """A plane, sphere, cylinder, cone or torus that was fitted to points, with its errors.
+
+    `surfsig.fit_sphere`, `surfsig.fit_cylinder` and `surfsig.fit_plane` give one, `surfsig.find_surfaces`
+    those of a scan. All lengths are in the points' own unit, all positions in their coordinates, all angles
+    in radians. NaN stands for what a kind does not have.
+    """
+
+    kind: Kind
+    """"plane", "sphere", "cylinder", "cone" or "torus"."""
+    point: Array
+    """(3,): the center of a sphere or torus; of the others a point of the plane or of the axis, near the
+    members. The covariance counts shifts there."""
+    axis: Array
+    """Unit vector (3,): a plane's normal; the axis, along which a cone widens; NaN for a sphere. But for a
+    cone its sign tells nothing; `fit_cylinder` and `fit_plane` give it a positive z (else y, else x)."""
+    radius: float
+    """Of a sphere or cylinder; of a cone at `point`; of a torus's tube; NaN for a plane."""
+    major_radius: float
+    """Of a torus, from its axis to the middle of its tube; NaN for others."""
+    half_angle: float
+    """Of a cone, between its axis and its side; NaN for others."""
+    covariance: Array
+    """Of the `parameters`, (p, p): of a plane its shift along the normal and two tilts (p = 3); of a sphere
+    its center and the radius (4); of the others two shifts of the axis at `point` and its two tilts, then of
+    a cylinder the radius (5), of a cone the radius and the half angle (6), of a torus the shift along the
+    axis, the major radius and the radius (7). Shifts and tilts are along `across`. From blocks of
+    neighbouring points, as `surfsig.fit_sphere` says; NaN where the points do not determine it."""
+    across: Array
+    """The two unit vectors across the axis, as rows (2, 3), along which shifts and tilts are counted; NaN for
+    a sphere."""
+    degrees_of_freedom: float
+    """Of the radius's standard error (a plane's: of its shift's), for Student's t."""
+    center: Array
+    """(3,): of a sphere or torus its center; of a cylinder or cone the middle of the piece of its axis beside
+    the members; of a plane the mean of the members, on the plane."""
+    length: float
+    """Of a cylinder, cone or torus, along the axis; of a plane the longer side of the smallest rectangle
+    around its members; NaN for a sphere."""
+    width: float
+    """Of a plane, the shorter side of that rectangle; NaN for others."""
+    arc: float
+    """Of a cylinder, cone or torus, how far the members go round the axis; of a sphere, how wide they are as
+    seen from its center: 2 pi is all of it; NaN for a plane."""
+    area: float
+    """Of the part of it that has points, as an estimate."""
+    members: NDArray[np.intp]
+    """The numbers of the points that it was fitted to, (m,), ascending."""
+    rms: float
+    """Root mean square of the members' distances."""
+    deviation: float
+    """The same, corrected for the parameters: the standard deviation of a point's distance."""
+
+    @property
+    def count(self) -> int:
+        """Number of members."""
+        return len(self.members)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the covariance's rows: x, y, z, shift, shift_1, tilt_1, ..., radius, half_angle."""
+        return PARAMETERS[self.kind]
+
+    @property
+    def radius_std(self) -> float:
+        """Standard error of the radius; NaN for a plane."""
+        return self._std("radius")
+
+    @property
+    def major_radius_std(self) -> float:
+        """Standard error of the major radius; NaN where there is none."""
+        return self._std("major_radius")
+
+    @property
+    def half_angle_std(self) -> float:
+        """Standard error of the half angle; NaN where there is none."""
+        return self._std("half_angle")
+
+    @property
+    def point_std(self) -> Array:
+        """Standard errors of `point`, (3,): none along a plane, nor along the axis of a cylinder or cone."""
+        return self._std_at(np.zeros(3))
+
+    @property
+    def center_std(self) -> Array:
+        """Standard errors of `center`, (3,), there on the axis or the plane; see `point_std`."""
+        return self._std_at(self.center - self.point)
+
+    @property
+    def axis_std(self) -> Array:
+        """Standard errors of `axis`, (3,), which has none along itself; NaN for a sphere."""
+        first, second = self.across
+        return self._vector_std({"tilt_1": first, "tilt_2": second})
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The radius's 95 % interval by Student's t, as far as `surfsig.fit_sphere` says; NaN for a plane."""
+        from scipy.stats import t
+
+        half = self.radius_std * float(t.ppf(0.5 + 0.5 * INTERVAL, self.degrees_of_freedom))
+        return self.radius - half, self.radius + half
+
+    @property
+    def free_directions(self) -> list[FreeDirection]:
+        """The motions that leave the surface as it is, were it without ends."""
+        return free_directions_of_surface(self.kind, self.center, self.axis)
+
+    def distances(self, points: PointCloud | ArrayLike) -> Array:
+        """Measure how far points are from the surface.
+
+        Parameters
+        ----------
+        points
+            What `PointCloud.of` takes, in the coordinates of the points that the surface was fitted to.
+
+        Returns
+        -------
+        numpy.ndarray
+            Signed distances (m,): positive outside, or where a plane's normal points; NaN where a coordinate
+            is not finite.
+        """
+        cloud = PointCloud.of(points)
+        local = cloud.offsets.astype(np.float64) + (cloud.origin - self.point)
+        with np.errstate(invalid="ignore"):
+            return self._placement.distances(local)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Name all values, as JSON and tables call them, without those that the kind does not have.
+
+        Returns
+        -------
+        dict
+            kind, center, axis, radius, radius_std, interval, major_radius, ..., covariance,
+            degrees_of_freedom by name, arrays as lists; the members are not in it.
+        """
+        names = ["kind", "center", "axis", "radius", "radius_std", "interval", "major_radius"]
+        names += ["major_radius_std", "half_angle", "half_angle_std", "length", "width", "arc", "area"]
+        names += ["count", "rms", "point", "across", "covariance", "degrees_of_freedom"]
+        values = {name: getattr(self, name) for name in names}
+        return {
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in values.items()
+            if isinstance(value, str) or not np.isnan(np.asarray(value, np.float64)).all()
+        }
+
+    def __repr__(self) -> str:
+        size = "" if math.isnan(self.radius) else f", radius={with_error(self.radius, self.radius_std)}"
+        return f"Surface({self.kind}{size}, rms={self.rms:.3g}, {self.count} points)"
+
+    @property
+    def _placement(self) -> Placement:
+        return Placement(self.kind, self.axis, self.radius, self.major_radius, self.half_angle)
+
+    def _std(self, name: str) -> float:
+        if name not in self.parameters:
+            return math.nan
+        row = self.parameters.index(name)
+        return math.sqrt(self.covariance[row, row])
+
+    def _std_at(self, offset: Array) -> Array:
+        """Give the standard errors of the surface at an offset from `point`, along the axis or the plane."""
+        if self.kind == "sphere":
+            return self._vector_std(dict(zip("xyz", np.eye(3), strict=True)))
+        first, second = self.across
+        if self.kind == "plane":
+            # A tilt of the normal lowers the plane on the side that the normal leans to.
+            tilts = {"tilt_1": -(offset @ first) * self.axis, "tilt_2": -(offset @ second) * self.axis}
+        else:
+            along = offset @ self.axis
+            tilts = {"tilt_1": along * first, "tilt_2": along * second}
+        return self._vector_std({"shift": self.axis, "shift_1": first, "shift_2": second, **tilts})
+
+    def _vector_std(self, directions: Mapping[str, Array]) -> Array:
+        """Give the standard errors of a vector that parameters move along directions."""
+        named = [name for name in self.parameters if name in directions]
+        if not named:
+            return np.full(3, math.nan)
+        rows = [self.parameters.index(name) for name in named]
+        derivatives = np.stack([directions[name] for name in named])
+        covariance = derivatives.T @ self.covariance[np.ix_(rows, rows)] @ derivatives
+        # Rounding may leave a variance of 0 below 0.
+        return np.asarray(np.sqrt(np.maximum(covariance.diagonal(), 0.0)))
+
+
+def measured_surface(
+    fitted: Mapping[str, Any], points: Array, origin: Array, members: NDArray[np.intp]
+) -> Surface:
+    """Describe what the core fitted, and measure how much of it the points cover.
+
+    Parameters
+    ----------
+    fitted
+        The core's values: kind, point, axis, radius, major_radius, half_angle, deviation; and, where the
+        points determine them, covariance, across, freedom. The point is in the cloud's coordinates.
+    points
+        The surface's points, (m, 3), less the origin.
+    origin
+        (3,), the cloud's.
+    members
+        (m,), the points' numbers in the cloud, ascending.
+    """
+    kind: Kind = fitted["kind"]
+    placement = Placement(
+        kind, fitted["axis"], fitted["radius"], fitted["major_radius"], fitted["half_angle"]
+    )
+    local = points + (origin - fitted["point"])
+    distances = placement.distances(local)
+    heights = placement.heights(local)
+    center = fitted["point"]
+    length, width, arc = math.nan, math.nan, covered_arc(placement, local)
+    if kind == "plane":
+        length, width = in_plane(placement, local)
+        center = center + placement.foot(local.mean(axis=0))
+    elif kind != "sphere":
+        length = float(np.ptp(heights))
+    if kind in ("cylinder", "cone"):
+        center = center + 0.5 * float(heights.min() + heights.max()) * placement.axis
+    unknowns = len(PARAMETERS[kind])
+    covariance = np.asarray(fitted.get("covariance", ()))
+    across = np.asarray(fitted.get("across", ()))
+    return Surface(
+        kind=kind,
+        point=fitted["point"],
+        axis=fitted["axis"],
+        radius=fitted["radius"],
+        major_radius=fitted["major_radius"],
+        half_angle=fitted["half_angle"],
+        covariance=covariance if covariance.size else np.full((unknowns, unknowns), math.nan),
+        across=across if across.size and kind != "sphere" else np.full((2, 3), math.nan),
+        degrees_of_freedom=fitted.get("freedom", math.nan),
+        center=center,
+        length=length,
+        width=width,
+        arc=arc,
+        area=covered_area(placement, local),
+        members=members,
+        rms=float(np.sqrt((distances**2).mean())),
+        deviation=fitted["deviation"],
+    )

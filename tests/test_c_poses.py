@@ -1,0 +1,101 @@
+"""The C interface's registration: values are Python's, bit for bit."""
+
+from ctypes import byref, c_double, c_uint32, c_void_p
+
+import numpy as np
+import pytest
+from c_interface import PROGRESS, CInterface, Failed, Registration, Scan, Transform, address
+from register_scenes import moved, pose, terrain
+
+import surfsig
+from surfsig import PointCloud
+
+SEED = 47
+ABOVE = np.array([0.2, 0.1, 4.0])
+CANCELLED = 5
+
+
+@pytest.fixture(scope="module")
+def scans() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Two scans of a terrain that overlap by a half, and T_second_first."""
+    rng = np.random.default_rng(SEED)
+    first, second, truth = terrain(rng, 8000, -1.4, 0.6), terrain(rng, 8000, -0.4, 1.6), pose(rng)
+    return np.ascontiguousarray(moved(first, np.linalg.inv(truth))), np.ascontiguousarray(second), truth
+
+
+def registered(
+    c: CInterface,
+    source: np.ndarray,
+    target: np.ndarray,
+    *,
+    viewpoints: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
+    start: np.ndarray | None = None,
+    radius: float = 0.0,
+    keypoints: int = 0,
+    stop: int = 0,
+) -> Registration:
+    """Register by the C interface."""
+    f, found = c.functions, Registration()
+    options = c_void_p(f.surfsig_registration_options_new())
+    c.check(f.surfsig_registration_options_set_radius(options, c_double(radius)))
+    c.check(f.surfsig_registration_options_set_keypoints(options, c_uint32(keypoints)))
+    c.check(f.surfsig_registration_options_set_threads(options, c_uint32(1)))
+    call = PROGRESS(lambda *_: stop)
+    c.check(f.surfsig_registration_options_set_progress(options, call, c_void_p()))
+    try:
+        with c.cloud_of(source) as first, c.cloud_of(target) as second:
+            both = [
+                Scan(cloud, None if viewpoint is None else address(viewpoint).value, None)
+                for cloud, viewpoint in zip((first, second), viewpoints, strict=True)
+            ]
+            given = None if start is None else byref(Transform.of(start))
+            c.check(f.surfsig_register(byref(both[0]), byref(both[1]), given, options, byref(found)))
+    finally:
+        f.surfsig_registration_options_free(options)
+    return found
+
+
+def check(found: Registration, expected: surfsig.Registration) -> None:
+    """All numbers are the same."""
+    np.testing.assert_array_equal(found.T_target_source.array(), expected.T_target_source)
+    np.testing.assert_array_equal(np.array(found.covariance[:]).reshape(6, 6), expected.covariance)
+    np.testing.assert_array_equal(found.center[:], expected.center)
+    assert found.free_direction_count == len(expected.free_directions)
+    for ours, theirs in zip(found.free_directions, expected.free_directions, strict=False):
+        np.testing.assert_array_equal(ours.axis[:], theirs.axis)
+        np.testing.assert_array_equal(ours.point[:], theirs.point)
+    for name in ("matches", "inliers", "overlap", "rms", "radius", "trusted"):
+        np.testing.assert_equal(getattr(found, name), getattr(expected, name))
+
+
+def test_registrations_are_those_of_python(
+    c: CInterface, scans: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> None:
+    source, target, truth = scans
+    viewpoints = np.ascontiguousarray(moved(ABOVE[None], np.linalg.inv(truth))[0]), ABOVE
+    ours = PointCloud(source, viewpoint=viewpoints[0]), PointCloud(target, viewpoint=ABOVE)
+    expected = surfsig.register(*ours, count=400)
+    assert expected.trusted
+    check(registered(c, source, target, viewpoints=viewpoints, keypoints=400), expected)
+    expected = surfsig.register(*ours, init=truth, radius=0.3)
+    check(registered(c, source, target, viewpoints=viewpoints, start=truth, radius=0.3), expected)
+
+
+def test_free_directions_are_those_of_python(c: CInterface) -> None:
+    rng = np.random.default_rng(SEED)
+    flat = [np.column_stack([rng.uniform(-1, 1, (4000, 2)), 0.002 * rng.normal(size=4000)]) for _ in "ab"]
+    found = registered(c, flat[0], flat[1], start=np.eye(4))
+    assert found.free_direction_count == 3
+    check(found, surfsig.register(flat[0], flat[1], init=np.eye(4)))
+
+
+def test_nothing_to_register_is_no_failure(c: CInterface) -> None:
+    found = registered(c, np.zeros((9, 3)), np.zeros((9, 3)))
+    assert not found.found
+    assert np.isnan(found.T_target_source.array()).all()
+
+
+def test_a_registration_is_stopped(c: CInterface, scans: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+    large = np.concatenate([scans[0] + 0.001 * k for k in range(40)])
+    with pytest.raises(Failed, match=f"^{CANCELLED}: "):
+        registered(c, large, large, stop=1)
