@@ -4,6 +4,7 @@ mod depth_image;
 mod e57;
 mod extract;
 mod field;
+mod finding;
 mod frame;
 mod primitive;
 mod python_file;
@@ -62,6 +63,8 @@ mod _surfsig {
     use crate::extract::{coordinate_steps, extract, voxel_representatives};
     #[pymodule_export]
     use crate::field::{field_keypoints, field_signatures, match_fields};
+    #[pymodule_export]
+    use crate::finding::{FindSettings, find_instances, point_spacing, prepare_model};
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]

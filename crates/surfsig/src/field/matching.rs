@@ -8,9 +8,18 @@ use crate::simd::products::{COLUMNS, Panel, ROWS, products};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 /// Angles about the axis that are tried; the best one lies between two of them.
 const ANGLES: usize = 128;
+
+/// Cosine and sine of each of them.
+static CIRCLE: LazyLock<[[f64; 2]; ANGLES]> = LazyLock::new(|| {
+    std::array::from_fn(|step| {
+        let angle = TAU / ANGLES as f64 * step as f64;
+        [angle.cos(), angle.sin()]
+    })
+});
 
 /// A place of a source and the place of a target that it is most like.
 ///
@@ -45,6 +54,7 @@ pub fn match_fields(source: &FieldPlaces, target: &FieldPlaces, mutual: bool) ->
         return Vec::new();
     }
     let nearest = most_similar(&source.vectors, &target.vectors);
+    crate::finding::tick("similar");
     let back = if mutual { most_similar(&target.vectors, &source.vectors) } else { Vec::new() };
     let is_mutual = |&(place, (other, _)): &(usize, (usize, f32))| !mutual || back[other].0 == place;
     let mut kept: Vec<(usize, (usize, f32))> = nearest.into_iter().enumerate().filter(is_mutual).collect();
@@ -55,7 +65,9 @@ pub fn match_fields(source: &FieldPlaces, target: &FieldPlaces, mutual: bool) ->
         distance: (2.0 - 2.0 * product).max(0.0).sqrt(),
         T_target_source: transform(source, place, target, other),
     };
-    kept.into_par_iter().with_min_len(16).map(matched).collect()
+    let out = kept.into_par_iter().with_min_len(16).map(matched).collect();
+    crate::finding::tick("transforms");
+    out
 }
 
 /// For each vector the number of the one with the largest scalar product, the first of several, and the product.
@@ -109,11 +121,12 @@ fn rotation_about_axis(source: &FieldPhases, target: &FieldPhases) -> f64 {
             sum[1] += a * d - b * c;
         }
     }
+    // Dereferenced once, not for each angle.
+    let circle: &[[f64; 2]; ANGLES] = &CIRCLE;
     let score = |step: usize| {
         let waves = agreement.iter().zip(1..).map(|([real, imaginary], order)| {
-            // Whole steps of the circle: the angle is reduced before it loses digits.
-            let angle = TAU / ANGLES as f64 * (order * step % ANGLES) as f64;
-            real * angle.cos() + imaginary * angle.sin()
+            let [cosine, sine] = circle[order * step % ANGLES];
+            real * cosine + imaginary * sine
         });
         waves.sum::<f64>()
     };

@@ -1,5 +1,7 @@
 //! How instances are searched and judged.
 
+use crate::alignment::PointToSurfaceSettings;
+
 /// What an expert may change; nothing has to be set. Lengths in voxels are in those of the scene's surface.
 ///
 /// ```
@@ -21,12 +23,20 @@ pub struct FindSettings {
     pub noises_per_voxel: f64,
     /// Voxels of the first judgement, in those of the last.
     pub coarse_voxels: f64,
-    /// Points of the model in the first judgement.
+    /// Points of the model in the first judgement of all proposals.
+    pub first_points: usize,
+    /// Voxels between correspondences in the steps of its alignment: from, to, how many.
+    pub first_distances: (f64, f64, usize),
+    /// Proposals that are judged by more points.
+    pub kept: usize,
+    /// Points of the model in that second judgement.
     pub coarse_points: usize,
-    /// Voxels between correspondences, in the steps of the first alignment and of the last: from, to, how many.
+    /// Likewise of its alignment.
     pub coarse_distances: (f64, f64, usize),
     /// Likewise of the last.
     pub fine_distances: (f64, f64, usize),
+    /// Points of the model in the last alignment; it is judged by all.
+    pub fine_points: usize,
     /// Patch radii, and radians, within which two proposed transforms agree.
     pub agreement: [f64; 2],
     /// Of these distances, between two proposals of which the less agreed one is left out.
@@ -35,6 +45,8 @@ pub struct FindSettings {
     pub same: [f64; 2],
     /// Points of the scene that an instance is fitted to at last.
     pub max_fitted: usize,
+    /// How it is fitted to them.
+    pub point_to_surface: PointToSurfaceSettings,
     /// Voxels from an instance's surface within which the scene's points are its own.
     pub own_distance: f64,
     /// What a point that the sensor saw through counts, in confirmed ones: of true poses hardly any is seen through.
@@ -64,13 +76,18 @@ impl Default for FindSettings {
             spacings_per_voxel: 1.5,
             noises_per_voxel: 2.5,
             coarse_voxels: 2.0,
+            first_points: 100,
+            first_distances: (4.0, 2.5, 4),
+            kept: 300,
             coarse_points: 300,
-            coarse_distances: (4.0, 1.5, 8),
+            coarse_distances: (2.5, 1.5, 4),
             fine_distances: (2.5, 1.5, 5),
+            fine_points: 1500,
             agreement: [0.5, 0.35],
             merged_share: 0.5,
             same: [0.25, 0.2],
             max_fitted: 5000,
+            point_to_surface: PointToSurfaceSettings::default(),
             own_distance: 1.5,
             contradicted_weight: 5.0,
             missing_weight: 1.0,
