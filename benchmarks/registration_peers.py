@@ -1,4 +1,4 @@
-"""Register pairs of clouds by Open3D or KISS-Matcher, and print a line of JSON: poses, seconds, confidence.
+"""Register pairs of clouds by Open3D or KISS-Matcher, and print a line of JSON: poses, times, confidence.
 
 Runs in the peers' own environment; `registration_peers.py versions` prints what is installed there.
 """
@@ -90,19 +90,20 @@ def main() -> None:
         names = {"Open3D": "open3d-cpu", "KISS-Matcher": "kiss-matcher"}
         print(json.dumps({name: metadata.version(package) for name, package in names.items()}))
         return
-    poses, seconds, confident = [], [], []
+    poses, seconds, processor, confident = [], [], [], []
     for path in arguments.pairs:
         arrays = np.load(path)
         source, target = arrays["source"], arrays["target"]
         for start in arrays["starts"]:
-            moved = source @ start[:3, :3].T + start[:3, 3]
+            moved = np.einsum("ij,nj->ni", start[:3, :3], source) + start[:3, 3]
             eyes = (start[:3, 3], np.zeros(3)) if arrays["known"] else (None, None)
-            begin = time.perf_counter()
+            begin = time.perf_counter(), time.process_time()
             pose, sure = METHODS[arguments.method](moved, target, eyes, arguments.voxel)
-            seconds.append(time.perf_counter() - begin)
+            seconds.append(time.perf_counter() - begin[0])
+            processor.append(time.process_time() - begin[1])
             poses.append(np.asarray(pose).tolist())
             confident.append(sure)
-    print(json.dumps({"poses": poses, "seconds": seconds, "confident": confident}))
+    print(json.dumps({"poses": poses, "seconds": seconds, "processor": processor, "confident": confident}))
 
 
 if __name__ == "__main__":

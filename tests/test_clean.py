@@ -1,7 +1,6 @@
 """Boxes, voxels and outliers: values against slow references, and against Open3D."""
 
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -141,7 +140,6 @@ def test_voxels_are_those_of_open3d() -> None:
 
 @pytest.mark.parametrize(("neighbors", "ratio"), [(20, 2.0), (5, 1.0), (1, 0.0), (50, 3.0)])
 def test_outliers_are_those_of_the_definition(neighbors: int, ratio: float) -> None:
-    pytest.importorskip("small_gicp")
     points = scan(800, 20)
     stays = slow_outliers(points, neighbors, ratio)
     assert 300 < len(stays) < len(points)
@@ -152,7 +150,6 @@ def test_outliers_are_those_of_the_definition(neighbors: int, ratio: float) -> N
 
 
 def test_outliers_are_those_of_open3d() -> None:
-    pytest.importorskip("small_gicp")
     pytest.importorskip("open3d", exc_type=ImportError)
     cloud = PointCloud(scan(20_000, 200), fields={"number": np.arange(20_200)})
     for neighbors, ratio in ((20, 2.0), (8, 1.0)):
@@ -164,7 +161,6 @@ def test_outliers_are_those_of_open3d() -> None:
 
 @pytest.mark.slow
 def test_outliers_do_not_depend_on_threads_or_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("small_gicp")
     cloud = PointCloud(scan(), fields={"number": np.arange(3030)})
     expected = surfsig.remove_outliers(cloud, threads=1).fields["number"]
     assert (surfsig.remove_outliers(cloud, threads=4).fields["number"] == expected).all()
@@ -174,13 +170,11 @@ def test_outliers_do_not_depend_on_threads_or_blocks(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.filterwarnings("error")
 def test_a_limit_beyond_float32_overflows_nothing() -> None:
-    pytest.importorskip("small_gicp")
     points = scan(300, 3).astype(np.float32)
     assert 200 < len(surfsig.remove_outliers(points)) < 303
 
 
 def test_outliers_of_small_and_odd_clouds() -> None:
-    pytest.importorskip("small_gicp")
     line = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0], [np.nan, 0, 0], [90, 0, 0]], np.float32)
     assert surfsig.remove_outliers(line, std_ratio=1).points[:, 0].tolist() == [0, 1, 2, 3]
     # All in one place: none is farther than any other.
@@ -210,16 +204,7 @@ def test_arguments_without_meaning(more: dict[str, Any], message: str) -> None:
         surfsig.remove_outliers(scan(50, 0), **more)
 
 
-def test_outliers_without_small_gicp(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "small_gicp", None)
-    with pytest.raises(
-        InvalidInputError, match=r"small_gicp is not installed: pip install 'surfsig\[clean\]'"
-    ):
-        surfsig.remove_outliers(scan(50, 0))
-
-
 def test_clean_on_the_command_line(shell: Callable[..., Any], tmp_path: Path) -> None:
-    pytest.importorskip("small_gicp")
     file, out = tmp_path / "scan.ply", tmp_path / "out.ply"
     cloud = PointCloud(scan(), fields={"label": np.arange(3030, dtype=np.int32)})
     surfsig.write(file, cloud)
@@ -258,7 +243,6 @@ def test_mistakes_on_the_command_line(
 
 
 def test_a_stereo_scan_without_its_strays(shared_data: Path) -> None:
-    pytest.importorskip("small_gicp")
     cloud = surfsig.read(shared_data / "surfaces" / "table_scene_mug.pcd")
     kept = surfsig.remove_outliers(cloud)
     assert 0.9 * cloud.finite.sum() < len(kept) < cloud.finite.sum()

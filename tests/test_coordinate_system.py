@@ -332,7 +332,6 @@ def test_it_goes_with_the_points_and_not_with_points_that_are_moved() -> None:
     assert surfsig.crop(cloud, [[-1] * 3, [1] * 3]).coordinate_system == system
     assert surfsig.files.options.in_metres(cloud, 0.3048).coordinate_system is None
     assert transform_cloud(np.eye(4), cloud).coordinate_system is None
-    pytest.importorskip("small_gicp")
     assert surfsig.downsample(cloud, 0.5).coordinate_system == system
 
 

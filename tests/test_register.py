@@ -39,7 +39,7 @@ def test_two_scans_that_overlap_by_half(parts: tuple[PointCloud, PointCloud, np.
     check(found, truth)
     assert 0.35 < found.overlap < 0.6
     assert found.rms == pytest.approx(0.002 * np.sqrt(1.25), rel=0.15)
-    assert 24 <= found.inliers <= found.matches
+    assert 32 <= found.inliers <= found.matches
 
 
 @pytest.mark.slow
@@ -101,8 +101,9 @@ def test_what_does_not_belong_together_is_not_trusted(
     parts: tuple[PointCloud, PointCloud, np.ndarray],
 ) -> None:
     rng = np.random.default_rng(SEED)
-    other = terrain(rng, 25_000, 5, 7)
-    assert not surfsig.register(parts[0], PointCloud(other, viewpoint=ABOVE + np.array([6.0, 0, 0]))).trusted
+    # The waves come again after 2 pi: from 5 to 7 they would be those of the first scan.
+    other = terrain(rng, 25_000, 7.5, 9.5)
+    assert not surfsig.register(parts[0], PointCloud(other, viewpoint=ABOVE + np.array([8.5, 0, 0]))).trusted
 
 
 def test_a_plane_slides_and_turns() -> None:

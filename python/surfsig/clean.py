@@ -1,18 +1,16 @@
 """Cleaning a cloud before its surface is fitted: a box, fewer points, no stray ones.
 
 Voxels are grouped by NumPy, because fields go with the points, which the libraries' own functions drop.
-Nearest points come from small_gicp's k-d tree: MIT, a wheel below 1 MB without dependencies, and as fast as
-SciPy's (BSD, 140 MB installed); Open3D's (300 MB) takes longer than either.
 """
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surfsig import _surfsig
 from surfsig.arguments import (
     MOST_NEIGHBORS,
     positive_length,
@@ -20,7 +18,6 @@ from surfsig.arguments import (
     thread_count,
     whole_number,
 )
-from surfsig.convert.libraries import library
 from surfsig.defaults import OUTLIER_NEIGHBORS, OUTLIER_STD_RATIO
 from surfsig.errors import InvalidInputError
 from surfsig.files.options import box_array, cropped
@@ -35,8 +32,6 @@ LATTICE_LIMIT = 1 << 43
 COORDINATE_LIMIT = 1e150
 """Beyond, the square of a distance leaves float64."""
 
-_SEARCH_CELLS = 64
-_NEIGHBOURS_AT_A_TIME = 1 << 22
 _COLOURS = ("red", "green", "blue", "alpha")
 _NORMALS = ("nx", "ny", "nz")
 
@@ -180,7 +175,7 @@ def remove_outliers(
     Raises
     ------
     InvalidInputError
-        If an argument has no meaning, or small_gicp is not installed.
+        If an argument has no meaning.
     """
     neighbors = whole_number(neighbors, "neighbors", MOST_NEIGHBORS)
     try:
@@ -190,47 +185,18 @@ def remove_outliers(
     if not 0 <= ratio < np.inf:
         raise InvalidInputError(f"std_ratio must be a finite number from 0 on, not {ratio:g}")
     cloud = _finite_part(remove_missing_returns(cloud))
-    workers = thread_count(threads) or os.cpu_count() or 1
-    done = Progress(progress_callback(progress), len(cloud))
+    workers, tell = thread_count(threads), progress_callback(progress)
     # With two points, both are as far from their nearest: there is nothing to compare.
     if len(cloud) < 3:
         return cloud
     if float(np.abs(cloud.offsets).max()) > COORDINATE_LIMIT:
         raise InvalidInputError(f"coordinates must be within {COORDINATE_LIMIT:g} to measure distances")
-    distances = _neighbour_distances(cloud.offsets, min(neighbors, len(cloud) - 1), workers, done)
+    points = np.ascontiguousarray(cloud.offsets, np.float64)
+    count = min(neighbors, len(cloud) - 1)
+    distances = _surfsig.mean_neighbor_distances(points, count=count, threads=workers, progress=tell)
     limit = distances.mean() + ratio * distances.std(ddof=1)
     stays = distances <= limit
     return cloud if stays.all() else cloud.at(np.flatnonzero(stays))
-
-
-def _neighbour_distances(
-    offsets: NDArray[Any], neighbors: int, workers: int, done: Progress
-) -> NDArray[np.float64]:
-    """Give each point's mean distance to its nearest others, (n,)."""
-    small_gicp = library("small_gicp", "small_gicp", "'surfsig[clean]'")
-    order = _nearby_in_turn(offsets)
-    points = offsets[order].astype(np.float64)
-    tree = small_gicp.KdTree(points, num_threads=workers)
-    means = np.empty(len(points))
-    block = max(1, _NEIGHBOURS_AT_A_TIME // neighbors)
-    for start in range(0, len(points), block):
-        rows = slice(start, start + block)
-        # The nearest of all is the point itself, or one in the same place.
-        _, squares = tree.batch_knn_search(points[rows], neighbors + 1, num_threads=workers)
-        means[order[rows]] = np.sqrt(np.asarray(squares)[:, 1:]).mean(axis=1)
-        done.advance(len(points[rows]))
-    return means
-
-
-def _nearby_in_turn(offsets: NDArray[Any]) -> NDArray[np.int64]:
-    """Order points by cells, so that searches one after the other find their part of the tree in the cache.
-
-    Points in random order take three times as long.
-    """
-    lowest = offsets.min(axis=0).astype(np.float64)
-    extent = float((offsets.max(axis=0) - lowest).max()) or 1.0
-    cells = ((offsets - lowest) / extent * _SEARCH_CELLS).astype(np.int64)
-    return np.argsort((cells @ [1 << 16, 1 << 8, 1]).astype(np.uint32), kind="stable")
 
 
 def _finite_part(cloud: PointCloud) -> PointCloud:

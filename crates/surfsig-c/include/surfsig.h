@@ -26,6 +26,11 @@
 #define SURFSIG_MOMENTS 35
 
 /**
+ * Most directions in which a transform can be free.
+ */
+#define SURFSIG_FREE_DIRECTIONS 6
+
+/**
  * Numbers of a signature.
  */
 #define SURFSIG_SIGNATURE 242
@@ -238,6 +243,11 @@ typedef struct surfsig_options surfsig_options;
 typedef struct surfsig_primitive surfsig_primitive;
 
 /**
+ * How scans are registered. Made by surfsig_registration_options_new(), freed by surfsig_registration_options_free().
+ */
+typedef struct surfsig_registration_options surfsig_registration_options;
+
+/**
  * How surfaces are found. Made by surfsig_surface_options_new(), freed by surfsig_surface_options_free().
  */
 typedef struct surfsig_surface_options surfsig_surface_options;
@@ -351,6 +361,25 @@ typedef struct {
 typedef int (*surfsig_progress)(void *data, size_t done, size_t total);
 
 /**
+ * A scan: its points, and what is known of where they were seen from.
+ */
+typedef struct {
+  /**
+   * The points.
+   */
+  const surfsig_cloud *cloud;
+  /**
+   * Where the sensor stood, in the cloud's coordinates: 3 doubles, finite; null where nobody knows.
+   */
+  const double *viewpoint;
+  /**
+   * In place of a viewpoint: for each point a vector of any length to the side from which it was seen, such as its
+   * normal, (count, 3) floats, packed; null for none.
+   */
+  const float *directions;
+} surfsig_scan;
+
+/**
  * A rotation and a translation: a point p of the source is at R p + t of the target. Written T_target_source, so that
  * T_a_b T_b_c = T_a_c.
  *
@@ -363,6 +392,75 @@ typedef struct {
    */
   double matrix[16];
 } surfsig_transform;
+
+/**
+ * A motion that does not change a surface, so that a transform of it is not determined in that direction.
+ */
+typedef struct {
+  /**
+   * Unit vector along a translation or a rotation's axis; NaN for rotations about every axis through the point.
+   */
+  double axis[3];
+  /**
+   * A point on the rotation's axis; NaN for a translation.
+   */
+  double point[3];
+} surfsig_free_direction;
+
+/**
+ * How a source lies in a target, and how sure that is.
+ */
+typedef struct {
+  /**
+   * Whether a transform was found; otherwise it and its covariance are NaN.
+   */
+  bool found;
+  /**
+   * Whether the transform is right, by what was seen; false where a direction is free.
+   */
+  bool trusted;
+  /**
+   * Takes the source's points to the target.
+   */
+  surfsig_transform T_target_source;
+  /**
+   * Of the small twist (rotation vector in radians, then translation) in the target's axes, about the center, that
+   * takes the given transform to the true one: 6 x 6, row by row.
+   */
+  double covariance[36];
+  /**
+   * Middle of the overlap, in the target's coordinates.
+   */
+  double center[3];
+  /**
+   * Number of free directions.
+   */
+  size_t free_direction_count;
+  /**
+   * Motions of the source, in the target's coordinates, that the overlap does not determine; NaN beyond the last.
+   */
+  surfsig_free_direction free_directions[SURFSIG_FREE_DIRECTIONS];
+  /**
+   * Keypoints that were matched; 0 where a start was given.
+   */
+  size_t matches;
+  /**
+   * Those of them that agree with the transform.
+   */
+  size_t inliers;
+  /**
+   * Share of the source's surface that lies on the target's, 0 to 1.
+   */
+  double overlap;
+  /**
+   * Root mean square of the distances there, in the scans' unit.
+   */
+  double rms;
+  /**
+   * Of the patches that were matched, in the scans' unit.
+   */
+  double radius;
+} surfsig_registration;
 
 #ifdef __cplusplus
 extern "C" {
@@ -793,6 +891,74 @@ surfsig_code surfsig_primitive_uncertainty(const surfsig_primitive *primitive,
  */
 double surfsig_primitive_independent_error(const surfsig_primitive *primitive,
                                            const surfsig_cloud *cloud);
+
+/**
+ * Makes options of the default values: the radius by the scans' size, 1,000 keypoints, all cores.
+ */
+surfsig_registration_options *surfsig_registration_options_new(void);
+
+/**
+ * Frees options; does nothing with null.
+ */
+void surfsig_registration_options_free(surfsig_registration_options *options);
+
+/**
+ * Chooses the radius of the patches that are matched.
+ *
+ * @param options The options to change.
+ * @param radius In the scans' unit; 0 for the default: 0.4 times the median distance of the points from their middle,
+ * of the smaller scan.
+ */
+surfsig_code surfsig_registration_options_set_radius(surfsig_registration_options *options,
+                                                     double radius);
+
+/**
+ * Chooses the number of keypoints of each scan.
+ *
+ * @param options The options to change.
+ * @param keypoints At least 1; 0 for the default.
+ */
+surfsig_code surfsig_registration_options_set_keypoints(surfsig_registration_options *options,
+                                                        uint32_t keypoints);
+
+/**
+ * Chooses the number of threads. The result is the same, bit for bit.
+ *
+ * @param options The options to change.
+ * @param threads 1 to 1024; 0 for all cores.
+ */
+surfsig_code surfsig_registration_options_set_threads(surfsig_registration_options *options,
+                                                      uint32_t threads);
+
+/**
+ * Chooses a function that is told the progress, and may stop the registration.
+ *
+ * @param options The options to change.
+ * @param progress Called with the number of steps done, and of all; null for none.
+ * @param data Given to it; must live as long as the options are used.
+ */
+surfsig_code surfsig_registration_options_set_progress(surfsig_registration_options *options,
+                                                       surfsig_progress progress,
+                                                       void *data);
+
+/**
+ * Finds how a scan lies in another, from any start, without a parameter.
+ *
+ * Keypoints are matched by their field signatures, the transform that most matches agree with is refined by
+ * generalised ICP, and the last steps fit points to the surface, which tells how sure it is. The result is always the
+ * same. That nothing was found is no failure: `found` is false then.
+ *
+ * @param source The scan that is moved.
+ * @param target The scan that stays, in the same unit.
+ * @param start T_target_source, roughly, which is then refined and not searched; null where nobody knows it.
+ * @param options How; null for the default.
+ * @param registration Where the result is put.
+ */
+surfsig_code surfsig_register(const surfsig_scan *source,
+                              const surfsig_scan *target,
+                              const surfsig_transform *start,
+                              const surfsig_registration_options *options,
+                              surfsig_registration *registration);
 
 /**
  * Makes the signatures of chosen queries, in the default frame. The first call of a process also makes the

@@ -81,6 +81,7 @@ impl surfsig_free_direction {
 pub const SURFSIG_FREE_DIRECTIONS: usize = 6;
 
 /// How a source lies in a target, and how sure that is.
+#[allow(non_snake_case, reason = "the name says from where to where")]
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct surfsig_registration {

@@ -13,28 +13,53 @@ use surfsig::{FIND_STEPS_PER_MODEL, FieldPlaces, Instance, Model, Monitor};
 settings_class! {
     /// How instances are searched and judged, for experts; see `surfsig.find_instances`.
     FindSettings of surfsig::FindSettings {
+        /// Proposed transforms that are judged by few points.
         proposals: usize = proposals,
-        tried: usize = tried,
-        spacings_per_voxel: f64 = spacings_per_voxel,
-        noises_per_voxel: f64 = noises_per_voxel,
-        coarse_voxels: f64 = coarse_voxels,
+        /// Points of the model in that first judgement.
         first_points: usize = first_points,
+        /// Voxels between correspondences in the steps of its alignment: from, to, how many.
         first_distances: (f64, f64, usize) = first_distances,
+        /// Proposals that are judged by more points.
         kept: usize = kept,
+        /// Points of the model in that second judgement.
         coarse_points: usize = coarse_points,
+        /// Voxels between correspondences in the steps of its alignment.
         coarse_distances: (f64, f64, usize) = coarse_distances,
-        fine_distances: (f64, f64, usize) = fine_distances,
+        /// Voxels of both judgements, in those of the last.
+        coarse_voxels: f64 = coarse_voxels,
+        /// Transforms that are aligned and judged by most points.
+        tried: usize = tried,
+        /// Points of the model in their alignment.
+        aligned_points: usize = aligned_points,
+        /// Points of the model in their judgement.
         fine_points: usize = fine_points,
+        /// Voxels between correspondences in its steps.
+        fine_distances: (f64, f64, usize) = fine_distances,
+        /// Distance between points of the surface, in the scene's point spacings at least.
+        spacings_per_voxel: f64 = spacings_per_voxel,
+        /// The same in the scene's noise.
+        noises_per_voxel: f64 = noises_per_voxel,
+        /// Patch radii, and radians, within which two proposed transforms agree.
         agreement: [f64; 2] = agreement,
+        /// Of these, between two proposals of which the less agreed one is left out.
         merged_share: f64 = merged_share,
+        /// Patch radii, and radians, within which two aligned transforms are the same.
         same: [f64; 2] = same,
+        /// Points of the scene that an instance is fitted to, at most.
         max_fitted: usize = max_fitted,
+        /// Voxels from an instance's surface within which the scene's points are its own.
         own_distance: f64 = own_distance,
+        /// What a point that the sensor saw through counts, in confirmed ones.
         contradicted_weight: f64 = contradicted_weight,
+        /// The same of one where the sensor saw nothing.
         missing_weight: f64 = missing_weight,
+        /// What a confirmed point counts where nobody knows what the sensor saw through.
         unknown_free_space_weight: f64 = unknown_free_space_weight,
+        /// Spread of confirmed normals from which on they are more than a plane.
         round_spread: f64 = round_spread,
+        /// Voxels from the scene's next point within which a point of the model lies on the scene.
         touching_distance: f64 = touching_distance,
+        /// Mean agreement of touching surfaces that is reached by chance, and by equal ones.
         agreement_by_chance: [f64; 2] = agreement_by_chance,
     }
 }

@@ -6,11 +6,11 @@ mod extract;
 mod field;
 mod finding;
 mod frame;
+mod neighbor_distances;
 mod primitive;
 mod python_file;
 mod registration;
 mod settings;
-mod surface_index;
 mod surfaces;
 
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
@@ -68,11 +68,11 @@ mod _surfsig {
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]
+    use crate::neighbor_distances::mean_neighbor_distances;
+    #[pymodule_export]
     use crate::primitive::{Primitive, fit_primitive};
     #[pymodule_export]
     use crate::registration::{RegistrationSettings, consistent_directions, free_directions, register};
-    #[pymodule_export]
-    use crate::surface_index::SurfaceIndex;
     #[pymodule_export]
     use crate::surfaces::find_surfaces;
 

@@ -26,23 +26,41 @@ impl ScanArgument<'_> {
 settings_class! {
     /// How scans are registered, for experts; see `surfsig.register`.
     RegistrationSettings of surfsig::RegistrationSettings {
+        /// Radius of the patches over the median distance of a scan's points from their middle.
         radius_share: f64 = radius_share,
+        /// Keypoints of each scan.
         keypoints: usize = keypoints,
+        /// Candidates for keypoints along a patch's radius.
         candidates_per_radius: f64 = candidates_per_radius,
+        /// Voxels along a patch's radius, to which scans are thinned before their patches are described.
         description_voxels_per_radius: f64 = description_voxels_per_radius,
+        /// Voxels along a patch's radius, to which scans are thinned before they are refined.
         voxels_per_radius: f64 = voxels_per_radius,
+        /// The same where normals are oriented by their neighbours, because no viewpoint is known.
         orientation_voxels_per_radius: f64 = orientation_voxels_per_radius,
+        /// Radii of a patch between a moved place and its correspondence within which a match agrees.
         consensus_max_distance: f64 = consensus.max_distance,
+        /// Smallest cosine between their axes, likewise.
         consensus_min_cosine: f64 = consensus.min_cosine,
+        /// Matches whose transforms are tried, the most similar first.
         consensus_proposals: usize = consensus.proposals,
+        /// Largest distances between correspondences in the two rounds of generalised ICP, in voxels.
         gicp_distances: [f64; 2] = gicp_distances,
+        /// Steps of each round, at most.
         gicp_iterations: usize = gicp_iterations,
+        /// Voxels from the target's nearest point beyond which there is no surface to measure from.
         surface_max_distance: f64 = point_to_surface.max_distance,
+        /// Standard deviations within which a residual is an inlier.
         surface_max_deviations: f64 = point_to_surface.max_deviations,
+        /// Steps of the last fit, at most.
         surface_max_iterations: usize = point_to_surface.max_iterations,
+        /// Points of the source in the last fit, at most.
         max_points: usize = max_points,
+        /// Matches that agree, from which on a transform is trusted.
         trusted_inliers: usize = trusted_inliers,
+        /// Overlap from which on it is.
         trusted_overlap: f64 = trusted_overlap,
+        /// Overlap from which on a transform is trusted that the caller gave roughly.
         trusted_overlap_of_start: f64 = trusted_overlap_of_start,
     }
 }

@@ -2,7 +2,9 @@
 
 /// A frozen class over a settings struct of the core: its name, the core's type, and for each keyword the field.
 macro_rules! settings_class {
-    ($(#[$doc:meta])* $name:ident of $core:ty { $($keyword:ident: $kind:ty = $($field:ident).+,)* }) => {
+    ($(#[$doc:meta])* $name:ident of $core:ty {
+        $($(#[$about:meta])* $keyword:ident: $kind:ty = $($field:ident).+,)*
+    }) => {
         $(#[$doc])*
         #[pyclass(frozen, eq, from_py_object, module = "surfsig")]
         #[derive(Debug, Clone, PartialEq)]
@@ -23,7 +25,8 @@ macro_rules! settings_class {
                 Self { core }
             }
 
-            $(#[getter]
+            $($(#[$about])*
+            #[getter]
             fn $keyword(&self) -> $kind {
                 self.core.$($field).+
             })*

@@ -94,6 +94,11 @@ impl KdTree {
         self.points.is_empty()
     }
 
+    /// The caller's numbers of the points in the order of the leaves: those near each other are near in it.
+    pub(crate) fn indices(&self) -> &[u32] {
+        &self.indices
+    }
+
     /// The number of the nearest point within `reach`, and its squared distance.
     ///
     /// ```

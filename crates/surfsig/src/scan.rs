@@ -121,6 +121,17 @@ impl CenteredScan {
         }
     }
 
+    /// Those of the points that are wanted.
+    pub fn some(&self, is_wanted: impl Fn(&[f64; 3]) -> bool) -> Self {
+        let chosen: Vec<usize> = (0..self.points.len()).filter(|&i| is_wanted(&self.points[i])).collect();
+        Self {
+            points: chosen.iter().map(|&i| self.points[i]).collect(),
+            numbers: chosen.iter().filter_map(|&i| self.numbers.get(i).copied()).collect(),
+            directions: self.directions.as_ref().map(|all| chosen.iter().map(|&i| all[i]).collect()),
+            ..*self
+        }
+    }
+
     pub fn scan(&self) -> Scan<'_> {
         Scan {
             cloud: PointCloud::new_f64(&self.points),

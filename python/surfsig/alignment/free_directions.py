@@ -32,12 +32,6 @@ class FreeDirection:
     point: Array
     """A point on the rotation's axis, (3,); NaN for a translation."""
 
-    @classmethod
-    def of(cls, motion: Motion, axis: Sequence[float] | None, point: Sequence[float] | None) -> FreeDirection:
-        """Make one of what is known of it."""
-        known = [np.full(3, np.nan) if vector is None else np.array(vector) for vector in (axis, point)]
-        return cls(motion, *known)
-
     def __str__(self) -> str:
         if np.isnan(self.axis).any():
             return f"rotates about {_text(self.point)}"
@@ -46,11 +40,24 @@ class FreeDirection:
         return f"slides along {_text(self.axis)}"
 
     def values(self) -> dict[str, Any]:
-        """Give motion, axis and point as plain numbers; without axis or point where there is none."""
+        """Give motion, axis and point as plain numbers, for JSON.
+
+        Returns
+        -------
+        By the names of the attributes; without axis or point where there is none.
+        """
         known = {"axis": self.axis, "point": self.point}
         return {"motion": self.motion} | {
             name: vector.tolist() for name, vector in known.items() if not np.isnan(vector).any()
         }
+
+
+def free_direction(
+    motion: Motion, axis: Sequence[float] | None, point: Sequence[float] | None
+) -> FreeDirection:
+    """Make a direction of what the core says of it."""
+    known = [np.full(3, np.nan) if vector is None else np.array(vector) for vector in (axis, point)]
+    return FreeDirection(motion, *known)
 
 
 def free_directions_of_surface(kind: str, point: Array, axis: Array) -> list[FreeDirection]:
@@ -73,7 +80,7 @@ def free_directions(points: Array, normals: Array) -> list[FreeDirection]:
         (n, 3) points and unit normals.
     """
     found = _surfsig.free_directions(*(np.ascontiguousarray(rows, np.float64) for rows in (points, normals)))
-    return [FreeDirection.of(*direction) for direction in found]
+    return [free_direction(*direction) for direction in found]
 
 
 def _text(vector: Array) -> str:

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from surfsig import _surfsig
 from surfsig._surfsig import FindSettings
-from surfsig.alignment.free_directions import FreeDirection
-from surfsig.arguments import thread_count
+from surfsig.alignment.free_directions import free_direction
+from surfsig.arguments import progress_callback, thread_count
 from surfsig.defaults import INSTANCE_SCORE
 from surfsig.errors import InvalidInputError
 from surfsig.finding.instances import Instance, Instances
@@ -102,11 +102,11 @@ def find_instances(
         free_space_viewpoint=None if scan.viewpoint is None else scan.viewpoint.tolist(),
         settings=settings,
         threads=threads,
-        progress=progress,
+        progress=progress_callback(progress),
     )
     instances = []
     for values in found:
-        free = [FreeDirection.of(*direction) for direction in values.pop("free_directions")]
+        free = [free_direction(*direction) for direction in values.pop("free_directions")]
         name, indices = names[values.pop("model")], numbers[values.pop("indices")]
         instances.append(Instance(name=name, free_directions=free, indices=indices, **values))
     if not instances:

@@ -19,14 +19,14 @@ _FEW, _SOME, _MANY = 60, 240, 600
 _ALL = 1 << 40
 _TRIED, _KEPT = 48, 12
 _MUTATIONS = 24
-_TURN, _SHIFT = 0.15, 0.06
+_ROTATION, _TRANSLATION = 0.15, 0.06
 """Of the first random changes: radians, and parts of the piece's extent; halved each round."""
 _COARSE_ROUNDS, _FINE_ROUNDS = 4, 6
-_SETTLING = 5
+_FIT_STEPS = 5
 _COARSE, _FINE = (4.0, 8.0), (15.0, 40.0)
 """What a contradicted and a missing place count, in confirmed ones: at first, when even the best poses are
 not exact; and in the end, when hardly any is left on true ones."""
-_FLAT, _ROUND = 0.7, 0.1
+_PLANAR, _CURVED = 0.7, 0.1
 """What a match of one plane counts against a round one, as many objects have a flat face; and the spread of
 confirmed normals (1 less the largest eigenvalue of their second moments) from which on it is round."""
 _HOPELESS = 0.1
@@ -64,8 +64,8 @@ def align(source: View, target: View, rng: np.random.Generator) -> Alignment | N
         poses, score = _best(poses, _scores(poses, views, _SOME, 1.0, _COARSE), _KEPT)
     if score[0] < _HOPELESS:
         return None
-    settled = [_settled(pose, views, _MANY) for pose in poses[: _KEPT // 2]]
-    return refined(np.concatenate([poses, settled]), source, target, rng)
+    fitted = [_fitted(pose, views, _MANY) for pose in poses[: _KEPT // 2]]
+    return refined(np.concatenate([poses, fitted]), source, target, rng)
 
 
 def refined(poses: Array, source: View, target: View, rng: np.random.Generator) -> Alignment:
@@ -76,10 +76,8 @@ def refined(poses: Array, source: View, target: View, rng: np.random.Generator) 
         poses, _ = _best(poses, scores, max(1, _KEPT >> (1 + number // 2)))
         poses = _mutated(poses, target, 0.5 ** (_COARSE_ROUNDS - 2 + number), rng)
     poses, _ = _best(poses, _scores(poses, views, _MANY, 1.0, _FINE), 1)
-    settled = _settled(poses[0], views, _ALL)
-    return max(
-        (measured(pose, source, target) for pose in (poses[0], settled)), key=lambda found: found.score
-    )
+    fitted = _fitted(poses[0], views, _ALL)
+    return max((measured(pose, source, target) for pose in (poses[0], fitted)), key=lambda found: found.score)
 
 
 def measured(pose: Array, source: View, target: View) -> Alignment:
@@ -118,7 +116,7 @@ def _weight(pose: Array, source: View, target: View) -> float:
     if not len(normals):
         return 0.0
     spread = 1.0 - float(np.linalg.eigvalsh(normals.T @ normals / len(normals))[-1])
-    return _FLAT + (1.0 - _FLAT) * min(spread / _ROUND, 1.0)
+    return _PLANAR + (1.0 - _PLANAR) * min(spread / _CURVED, 1.0)
 
 
 def _best(poses: Array, score: Array, most: int) -> tuple[Array, Array]:
@@ -127,38 +125,38 @@ def _best(poses: Array, score: Array, most: int) -> tuple[Array, Array]:
 
 
 def _mutated(poses: Array, target: View, step: float, rng: np.random.Generator) -> Array:
-    """Give the poses, and each turned about the target's middle and shifted at random."""
+    """Give the poses, and each rotated about the target's middle and translated at random."""
     count = len(poses) * _MUTATIONS
-    rotation_vectors = rng.normal(0.0, _TURN * step, (count, 3))
-    translations = rng.normal(0.0, _SHIFT * step * target.extent, (count, 3))
+    rotation_vectors = rng.normal(0.0, _ROTATION * step, (count, 3))
+    translations = rng.normal(0.0, _TRANSLATION * step * target.extent, (count, 3))
     changes = from_rotation_vector(rotation_vectors, translations)
     return np.concatenate([poses, changes @ np.repeat(poses, _MUTATIONS, axis=0)])
 
 
-def _settled(pose: Array, views: tuple[View, View], most: int) -> Array:
+def _fitted(pose: Array, views: tuple[View, View], most: int) -> Array:
     """Refine a pose by point-to-plane least squares over the confirmed points, there and back.
 
     The correspondences are those of the depth images. Where the points leave a direction free (along a
     cylinder, in a plane), the least change is taken, none in that direction.
     """
     source, target = views
-    for _ in range(_SETTLING):
+    for _ in range(_FIT_STEPS):
         kept, foot, normal = target.image.correspondences(pose, source.surface, most, target.tolerance)
         moved = transform_points(pose, source.points[kept])
         rows = [_row(moved / target.extent, normal)]
-        heights = [np.einsum("ij,ij->i", moved - foot, normal)]
+        residuals = [np.einsum("ij,ij->i", moved - foot, normal)]
         back = inverse(pose)
         kept, foot, normal = source.image.correspondences(back, target.surface, most, source.tolerance)
         normal = rotate(pose, normal)
         # The target's point stays and the source's surface moves: the opposite sign.
         rows.append(_row(target.points[kept] / target.extent, normal))
-        heights.append(np.einsum("ij,ij->i", transform_points(pose, foot) - target.points[kept], normal))
-        design, height = np.concatenate(rows), np.concatenate(heights)
+        residuals.append(np.einsum("ij,ij->i", transform_points(pose, foot) - target.points[kept], normal))
+        design, residual = np.concatenate(rows), np.concatenate(residuals)
         if len(design) < 6:
             break
         values, vectors = np.linalg.eigh(design.T @ design)
         inverted = np.where(values > _FREE**2 * values[-1], 1.0 / np.maximum(values, 1e-300), 0.0)
-        change = -vectors @ (inverted * (vectors.T @ (design.T @ height)))
+        change = -vectors @ (inverted * (vectors.T @ (design.T @ residual)))
         pose = from_rotation_vector(change[:3] / target.extent, change[3:]) @ pose
     return pose
 
@@ -168,5 +166,5 @@ _FREE = 0.03
 
 
 def _row(points: Array, normals: Array) -> Array:
-    """Give the change of heights for small turns and shifts, (n, 6)."""
+    """Give the change of residuals for a small twist, (n, 6)."""
     return np.hstack([np.cross(points, normals), normals])

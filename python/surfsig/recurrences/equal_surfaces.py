@@ -129,17 +129,17 @@ def _pooled(sizes: Array, errors: Array) -> tuple[Array, Array]:
 
 
 def _motion(first: Surface, other: Surface) -> Array:
-    """Give T_other_first: centre to centre, axis to axis by the smallest turn."""
+    """Give T_other_first: centre to centre, axis to axis by the smallest rotation."""
     pose = np.eye(4)
     if first.kind != "sphere":
         # A cone's axis has a direction; the others' do not.
         sign = 1.0 if first.kind == "cone" or float(first.axis @ other.axis) >= 0.0 else -1.0
         target = sign * other.axis
         angle = float(np.arccos(np.clip(first.axis @ target, -1.0, 1.0)))
-        way = np.cross(first.axis, target)
-        size = float(np.linalg.norm(way))
-        way = way / size if size > 0.0 else axes_across(first.axis)[0]
-        pose = from_rotation_vector(angle * way, np.zeros(3))
+        rotation_axis = np.cross(first.axis, target)
+        size = float(np.linalg.norm(rotation_axis))
+        rotation_axis = rotation_axis / size if size > 0.0 else axes_across(first.axis)[0]
+        pose = from_rotation_vector(angle * rotation_axis, np.zeros(3))
     pose[:3, 3] = _place(other) - transform_points(pose, _place(first))
     return pose
 

@@ -1,4 +1,4 @@
-"""Whether two pieces can be alike by the surface that most of each is."""
+"""Whether two pieces can be equal by the surface that most of each is."""
 
 from __future__ import annotations
 

@@ -22,9 +22,9 @@ _ALIKE = 0.7
 """Share of a piece's signatures that the other must have too, of the piece where it is larger."""
 _EQUAL = 0.99
 """zeta (eq. 12) of signatures that count as the same; stricter than the paper's "optimal", as here they need
-not be alike but equal, size included."""
+not be similar but equal, size included."""
 _DOUBTFUL = 0.5
-"""Scores below which a pose by way of a third piece is tried, too."""
+"""Scores below which a pose through a third piece is tried, too."""
 _DETOURS = 3
 _WORTHWHILE = 0.25
 """Scores from which on an alignment is good for a detour."""
@@ -45,7 +45,7 @@ def matched_pairs(
     threads: int | None,
     progress: ProgressCallback | None,
 ) -> Pairs:
-    """Align all pairs of pieces whose signatures are alike.
+    """Align all pairs of pieces whose signatures are similar.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def poses_from(start: int, members: list[int], pairs: Pairs, scores: Array) -> d
 
 
 def _take_detours(pairs: Pairs, views: Sequence[View], mains: Sequence[Surface | None], seed: int) -> None:
-    """Try, for doubtful pairs, the poses by way of third pieces that match both well."""
+    """Try, for doubtful pairs, the poses through third pieces that match both well."""
     scores = scores_of(pairs, len(views))
     for j in range(len(views)):
         for i in range(j):

@@ -1,4 +1,4 @@
-"""Poses that bring one piece onto another, proposed by pairs of oriented points that are alike.
+"""Poses that bring one piece onto another, proposed by pairs of similar oriented points.
 
 Drost, Ulrich, Navab, Ilic: Model globally, match locally (CVPR 2010).
 """
@@ -16,7 +16,7 @@ from surfsig.geometry import inverse
 Array = NDArray[np.float64]
 
 _NEAREST = 16
-_ALIKE = 4
+_SIMILAR = 4
 _ALONG = 1e-3
 """Radians between the line from point to point and the first normal, below which a pair has no axes."""
 _TOLERANCE = 0.35
@@ -86,10 +86,10 @@ def proposed_poses(source: PointPairs, target: PointPairs, most: int, rng: np.ra
     """Propose poses T_target_source, (at most `most`, 4, 4), of pairs that `rng` chooses."""
     if not len(source.first) or not len(target.first):
         return np.empty((0, 4, 4))
-    chosen = rng.choice(len(source.first), min(len(source.first), max(1, most // _ALIKE)), replace=False)
+    chosen = rng.choice(len(source.first), min(len(source.first), max(1, most // _SIMILAR)), replace=False)
     _, match = target.tree.query(source.features[chosen], k=_NEAREST, distance_upper_bound=_TOLERANCE)
-    # Of the alike ones some at random: the very nearest are often neighbours of each other.
-    match = rng.permuted(match, axis=1)[:, :_ALIKE]
+    # Of the similar ones some at random: the very nearest are often neighbours of each other.
+    match = rng.permuted(match, axis=1)[:, :_SIMILAR]
     found = match < len(target.first)
     row = chosen[np.nonzero(found)[0]]
     column = match[found]

@@ -196,7 +196,7 @@ class Recurrences:
         -------
         pandas.DataFrame
             group, scan, points, x, y, z (its mean), score, qx, qy, qz, qw, tx, ty, tz (T_member_first: unit
-            quaternion, shift), free (the free directions in words).
+            quaternion, translation), free (the free directions in words).
 
         Raises
         ------
@@ -215,8 +215,8 @@ class Recurrences:
                 piece = self.pieces[member]
                 row = {"piece": member, "group": number, "scan": piece.scan, "points": len(piece.points)}
                 row |= dict(zip("xyz", piece.center, strict=True)) | {"score": score}
-                turn = Rotation.from_matrix(pose[:3, :3]).as_quat()
-                row |= dict(zip(("qx", "qy", "qz", "qw"), turn, strict=True))
+                rotation = Rotation.from_matrix(pose[:3, :3]).as_quat()
+                row |= dict(zip(("qx", "qy", "qz", "qw"), rotation, strict=True))
                 row |= dict(zip(("tx", "ty", "tz"), pose[:3, 3], strict=True)) | {"free": free}
                 rows.append(row)
         names = ["piece", "group", "scan", "points", "x", "y", "z", "score"]

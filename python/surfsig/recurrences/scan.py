@@ -11,8 +11,8 @@ from surfsig.extraction import Extraction
 from surfsig.flat_atom import flat_atom_length
 from surfsig.recurrences.pieces import pieces_of
 from surfsig.recurrences.result import Piece
+from surfsig.recurrences.sensor_position import SensorPosition
 from surfsig.recurrences.shadows import Region, places_without_points
-from surfsig.recurrences.standpoint import Standpoint
 from surfsig.recurrences.view import View, view_of
 from surfsig.spacing import point_spacing
 from surfsig.surfaces import Surfaces
@@ -31,7 +31,7 @@ _NEAR = 2.0
 _LOOKED_AT, _AROUND = 8, 2.5
 """Pieces whose shadows are looked at, and how far around them, in their extents."""
 _NOISES, _SPACINGS = 3.0, 0.4
-"""The tolerance of heights: standard deviations of the noise, or point spacings where that is more."""
+"""Tolerance of distances from a surface: standard deviations of the noise, or point spacings where more."""
 
 
 class ScanPieces:
@@ -74,8 +74,8 @@ class ScanPieces:
         """Prepare the pieces for alignment; `length` is the unit of the distances of pairs of points."""
         if not self.pieces:
             return []
-        standpoint = Standpoint(self.cloud, self._regions(), self.spacing)
-        guessed = None if standpoint.place is None else standpoint.place + self.cloud.origin
+        sensor = SensorPosition(self.cloud, self._regions(), self.spacing)
+        guessed = None if sensor.viewpoint is None else sensor.viewpoint + self.cloud.origin
         around = extract(
             self.cloud, radius=_NORMAL_BALL * self.spacing, viewpoint=guessed, threads=self._threads
         )
@@ -86,14 +86,14 @@ class ScanPieces:
         views = []
         for piece, all_rows in zip(self.pieces, self.rows, strict=True):
             rows = all_rows[known[all_rows]] if known[all_rows].any() else all_rows
-            eye = standpoint.eye(piece)
+            viewpoint = sensor.viewpoint_of(piece)
             views.append(
                 view_of(
                     rows,
                     self.points,
                     normals,
-                    eye=eye,
-                    second=None if standpoint.second is None else eye + standpoint.second,
+                    viewpoint=viewpoint,
+                    second=None if sensor.second is None else viewpoint + sensor.second,
                     supports=[(place, normal) for _, place, normal in self._beneath(rows)],
                     spacing=self.spacing,
                     length=length,
@@ -133,10 +133,10 @@ class ScanPieces:
         middle, extent = self._ball(rows)
         found = []
         for members, place, normal in self.supports:
-            height = (self.points[rows] - place) @ normal
-            side = 1.0 if np.median(height) > 0.0 else -1.0
+            distance = (self.points[rows] - place) @ normal
+            side = 1.0 if np.median(distance) > 0.0 else -1.0
             near = np.linalg.norm(self.points[members] - middle, axis=1).min() <= _NEAR * extent
-            if near and (side * height > -0.5 * self.spacing).mean() >= _ABOVE:
+            if near and (side * distance > -0.5 * self.spacing).mean() >= _ABOVE:
                 found.append((members, place, side * normal))
         return found
 

@@ -59,35 +59,40 @@ def places_without_points(support: Array, spacing: float) -> Array:
     return np.asarray(middle + grid[np.isinf(gap) & inside] @ axes)
 
 
-def second_place(regions: Sequence[Region], eyes: Sequence[Array], spacing: float) -> Array | None:
+def second_place(regions: Sequence[Region], viewpoints: Sequence[Array], spacing: float) -> Array | None:
     """Find from where else points had to be seen to be measured.
 
     Parameters
     ----------
-    regions, eyes
+    regions, viewpoints
         Around several pieces, and where the sensor stood, (3,) each.
     spacing
         Between points.
 
     Returns
     -------
-    The shift (3,) from the sensor's place to the other; None where there is no sign of one.
+    The translation (3,) from the sensor's viewpoint to the other; None where there is no sign of one.
     """
-    ways = [_towards(eye, region) for eye, region in zip(eyes, regions, strict=True)]
+    directions = [_towards(viewpoint, region) for viewpoint, region in zip(viewpoints, regions, strict=True)]
     left = [
-        replace(region, empty=region.empty[~hidden_from(way, region.empty, region.points, spacing)])
-        for way, region in zip(ways, regions, strict=True)
+        replace(region, empty=region.empty[~hidden_from(direction, region.empty, region.points, spacing)])
+        for direction, region in zip(directions, regions, strict=True)
     ]
     if sum(len(region.empty) for region in left) < _FEWEST:
         return None
-    distance = float(np.linalg.norm(eyes[0] - left[0].points.mean(axis=0)))
+    distance = float(np.linalg.norm(viewpoints[0] - left[0].points.mean(axis=0)))
 
-    def shifted(direction: Array) -> list[Array]:
-        shift = distance * (direction - ways[0])
-        return [_towards(eye + shift, region) for eye, region in zip(eyes, left, strict=True)]
+    def translated(to_sensor: Array) -> list[Array]:
+        translation = distance * (to_sensor - directions[0])
+        return [
+            _towards(viewpoint + translation, region)
+            for viewpoint, region in zip(viewpoints, left, strict=True)
+        ]
 
-    best, worth = _best_direction(ways[0], lambda way: _worth(shifted(way), left, spacing))
-    return distance * (best - ways[0]) if worth >= _EXPLAINED else None
+    best, worth = _best_direction(
+        directions[0], lambda direction: _worth(translated(direction), left, spacing)
+    )
+    return distance * (best - directions[0]) if worth >= _EXPLAINED else None
 
 
 def direction_of_sensor(regions: Sequence[Region], spacing: float) -> Array | None:
@@ -98,17 +103,19 @@ def direction_of_sensor(regions: Sequence[Region], spacing: float) -> Array | No
     if sum(len(region.empty) for region in regions) < _FEWEST:
         return None
     best, worth = _best_direction(
-        regions[0].normal, lambda way: _worth([way] * len(regions), regions, spacing)
+        regions[0].normal, lambda direction: _worth([direction] * len(regions), regions, spacing)
     )
     return best if worth >= _EXPLAINED else None
 
 
-def _worth(ways: Sequence[Array], regions: Sequence[Region], spacing: float) -> float:
+def _worth(directions: Sequence[Array], regions: Sequence[Region], spacing: float) -> float:
     """Give the share of empty places that are hidden, less what points that are hidden count against it."""
-    parts = list(zip(ways, regions, strict=True))
-    empty = np.concatenate([hidden_from(way, region.empty, region.points, spacing) for way, region in parts])
+    parts = list(zip(directions, regions, strict=True))
+    empty = np.concatenate(
+        [hidden_from(direction, region.empty, region.points, spacing) for direction, region in parts]
+    )
     points = np.concatenate(
-        [hidden_from(way, region.points, region.points, spacing) for way, region in parts]
+        [hidden_from(direction, region.points, region.points, spacing) for direction, region in parts]
     )
     return float(empty.mean() - _AGAINST * points.mean())
 
@@ -134,6 +141,6 @@ def _best_direction(around: Array, worth: Callable[[Array], float]) -> tuple[Arr
     return tilted(found), value
 
 
-def _towards(eye: Array, region: Region) -> Array:
-    way = eye - region.points.mean(axis=0)
-    return np.asarray(way / np.linalg.norm(way))
+def _towards(viewpoint: Array, region: Region) -> Array:
+    direction = viewpoint - region.points.mean(axis=0)
+    return np.asarray(direction / np.linalg.norm(direction))

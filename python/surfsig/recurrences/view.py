@@ -39,7 +39,7 @@ class View:
     extent: float
     """Largest distance from the middle."""
     tolerance: float
-    """Height within which a point is on a surface."""
+    """Distance within which a point is on a surface."""
 
 
 def view_of(
@@ -47,7 +47,7 @@ def view_of(
     points: Array,
     normals: Array,
     *,
-    eye: Array,
+    viewpoint: Array,
     second: Array | None,
     supports: Sequence[tuple[Array, Array]],
     spacing: float,
@@ -62,7 +62,7 @@ def view_of(
         The numbers of its points.
     points, normals
         (n, 3), of the scan.
-    eye, second
+    viewpoint, second
         Where the sensor stood, and from where else points had to be seen to be measured.
     supports
         Planes that carry pieces: a place and the unit normal of each.
@@ -71,7 +71,7 @@ def view_of(
     length
         The unit of the distances of pairs.
     tolerance
-        Height within which a point is on a surface.
+        Distance within which a point is on a surface.
     """
     middle = points[piece].mean(axis=0)
     extent = float(np.linalg.norm(points[piece] - middle, axis=1).max())
@@ -87,7 +87,7 @@ def view_of(
     image = DepthImage(
         surface(around),
         np.isin(around, piece),
-        eye=(eye - middle).tolist(),
+        eye=(viewpoint - middle).tolist(),
         spacing=spacing,
         reach=reach,
         floors=SurfacePlaces(*(np.ascontiguousarray(part) for part in floors.swapaxes(0, 1))),

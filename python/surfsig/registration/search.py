@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
 from surfsig._surfsig import RegistrationSettings
-from surfsig.alignment.free_directions import FreeDirection
-from surfsig.arguments import positive_length, thread_count, whole_number
+from surfsig.alignment.free_directions import free_direction
+from surfsig.arguments import positive_length, progress_callback, thread_count, whole_number
 from surfsig.geometry import pose_array
 from surfsig.missing_returns import without_missing_returns
 from surfsig.orientation import orientation
@@ -89,10 +89,10 @@ def register(
         keypoints=None if count is None else whole_number(count, "count", 2**32 - 1),
         settings=settings,
         threads=thread_count(threads),
-        progress=progress,
+        progress=progress_callback(progress),
     )
     transform = found.pop("T_target_source")
-    directions = [FreeDirection.of(*direction) for direction in found.pop("free_directions")]
+    directions = [free_direction(*direction) for direction in found.pop("free_directions")]
     result = Registration(
         T_target_source=np.full((4, 4), np.nan) if transform is None else np.array(transform),
         free_directions=directions,

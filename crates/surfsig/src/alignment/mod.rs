@@ -19,6 +19,6 @@ pub(crate) use consensus::Correspondences;
 pub(crate) use even_sample::even_sample;
 pub use gicp::{GicpCloud, GicpResult, GicpSettings, gicp};
 pub use observability::{FreeDirection, free_directions};
-pub(crate) use point_to_plane::{OrientedSurface, transformed};
+pub(crate) use point_to_plane::{FACING_AWAY, OrientedSurface, cosine_towards, transformed};
 pub use point_to_surface::PointToSurfaceSettings;
 pub(crate) use point_to_surface::{PointToSurface, TargetSurface};

@@ -12,6 +12,9 @@ const MIN_CORRESPONDENCES: usize = 12;
 /// Share of the largest eigenvalue below which a motion is not observable; it is not made.
 const UNOBSERVABLE: f64 = 1e-3;
 
+/// Cosine to the line of sight below which a point faces away, so far that no normal of a visible one is alike.
+pub(crate) const FACING_AWAY: f32 = -0.2;
+
 /// Points with unit normals, searched for the nearest one whose normal is alike.
 #[derive(Debug, Clone)]
 pub(crate) struct OrientedSurface {
@@ -39,16 +42,24 @@ impl OrientedSurface {
 
     /// The transforms of a source fitted to this surface by point to plane: a step for each of the largest distances
     /// between correspondences. Motions that the correspondences do not determine are not made.
+    ///
+    /// Where all of this surface was seen from a viewpoint, source points that face away from it have no
+    /// correspondence, and none is searched.
     pub fn align_all(
         &self,
         transforms: &[RigidTransform],
         source: &[SurfacePlace],
         max_distances: &[f64],
+        viewpoint: Option<[f64; 3]>,
     ) -> Vec<RigidTransform> {
         let aligned = |start: &RigidTransform| {
             let mut transform = *start;
             for &max_distance in max_distances {
-                let Some(better) = self.stepped(&transform, source, max_distance) else { break };
+                let facing: Vec<SurfacePlace> = match viewpoint {
+                    Some(viewpoint) => facing(&transform, source, viewpoint),
+                    None => source.to_vec(),
+                };
+                let Some(better) = self.stepped(&transform, &facing, max_distance) else { break };
                 transform = better;
             }
             transform
@@ -102,6 +113,19 @@ pub(crate) fn transformed(transform: &RigidTransform, point: &SurfacePlace) -> S
         place: transform.transform_point(point.place.map(f64::from)).map(|x| x as f32),
         normal: transform.transform_vector(point.normal.map(f64::from)).map(|x| x as f32),
     }
+}
+
+/// The source's points that face a viewpoint in the target under T_target_source.
+fn facing(transform: &RigidTransform, source: &[SurfacePlace], viewpoint: [f64; 3]) -> Vec<SurfacePlace> {
+    // In the source only one point has to be moved.
+    let from = transform.inverse().transform_point(viewpoint).map(|x| x as f32);
+    source.iter().filter(|point| cosine_towards(point, from) > FACING_AWAY).copied().collect()
+}
+
+/// Of the angle between a point's normal and the direction from it to another.
+pub(crate) fn cosine_towards(point: &SurfacePlace, other: [f32; 3]) -> f32 {
+    let towards = [0, 1, 2].map(|k| other[k] - point.place[k]);
+    dot(&point.normal, &towards) / dot(&towards, &towards).sqrt()
 }
 
 fn vector(v: &[f32; 3]) -> Vector3<f64> {
@@ -160,7 +184,7 @@ mod tests {
             RigidTransform::from_rotation_vector([0.05, -0.04, 0.06], [0.8, -0.6, 0.5]),
             RigidTransform::from_rotation_vector([0.0; 3], [100.0, 0.0, 0.0]),
         ];
-        let found = surface.align_all(&starts, &points, &distances);
+        let found = surface.align_all(&starts, &points, &distances, None);
         assert!(found[0].log().iter().all(|component| component.abs() < 1e-5), "{:?}", found[0]);
         assert_eq!(found[1], starts[1], "far from everything");
     }
@@ -171,7 +195,7 @@ mod tests {
             box_points().into_iter().filter(|point| point.normal == [0.0, 0.0, 1.0]).collect();
         let surface = OrientedSurface::new(plane.clone());
         let start = RigidTransform::from_rotation_vector([0.0, 0.0, 0.3], [0.7, -0.4, 0.5]);
-        let [found] = surface.align_all(&[start], &plane, &[2.0; 4])[..] else { panic!("one transform") };
+        let [found] = surface.align_all(&[start], &plane, &[2.0; 4], None)[..] else { panic!("one transform") };
         let wanted = RigidTransform::from_rotation_vector([0.0, 0.0, 0.3], [0.7, -0.4, 0.0]);
         let off = (found * wanted.inverse()).log();
         assert!(off.iter().all(|component| component.abs() < 1e-6), "{found:?}");

@@ -327,8 +327,9 @@ impl System {
 mod tests {
     use super::*;
 
+    /// From -1 to 1.
     fn number(i: usize) -> f64 {
-        (i as f64 * 12.9898).sin() * 43_758.545_3 % 1.0
+        2.0 * super::crate::random::uniform(i, 2) - 1.0
     }
 
     /// Points of a hilly terrain of 40 x 40 voxels, each off it by a normally distributed error.

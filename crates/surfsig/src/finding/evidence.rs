@@ -4,7 +4,7 @@ use super::FindSettings;
 use super::model::Model;
 use super::rim::Rim;
 use super::scene::SceneSurface;
-use crate::alignment::transformed;
+use crate::alignment::{FACING_AWAY, cosine_towards, transformed};
 use crate::depth_image::{ALIKE, FACING, SurfacePlace, dot};
 use crate::geometry::RigidTransform;
 use crate::random::some_of;
@@ -48,12 +48,15 @@ pub(super) struct ModelView<'a> {
     settings: &'a FindSettings,
 }
 
-/// Shares of a model's samples.
-#[derive(Clone, Copy, Default)]
-struct Shares {
+/// What depth images say of a model's samples.
+struct Seen {
+    /// Shares of all.
     confirmed: f64,
     wrong: f64,
+    /// Share of those that face the sensor.
     visible: f64,
+    /// Of each to the line of sight.
+    cosines: Vec<f32>,
 }
 
 impl<'a> ModelView<'a> {
@@ -86,7 +89,7 @@ impl<'a> ModelView<'a> {
         let steps: Vec<f64> = (0..count).map(distance).collect();
         let some: Vec<SurfacePlace> =
             some_of(self.samples.len(), most).into_iter().map(|i| self.samples[i]).collect();
-        self.scene.surface.align_all(transforms, &some, &steps)
+        self.scene.surface.align_all(transforms, &some, &steps, self.viewpoint)
     }
 
     /// Weighs transforms (T_scene_model); `is_free` says which samples of the scene no other instance explains.
@@ -116,9 +119,15 @@ impl<'a> ModelView<'a> {
                     [found.confirmed, found.contradicted, found.missing].map(f64::from);
                 let wrong = self.settings.contradicted_weight * contradicted
                     + self.settings.missing_weight * missing;
-                let facing = self.facing(transform, viewpoint);
+                // In the model's axes only one point has to be moved.
+                let from = transform.inverse().transform_point(viewpoint).map(|x| x as f32);
+                let cosines: Vec<f32> =
+                    self.samples.iter().map(|sample| cosine_towards(sample, from)).collect();
+                let facing = cosines.iter().filter(|&&cosine| cosine > FACING).count();
+                let facing = facing as f64 / self.samples.len().max(1) as f64;
                 let visible = confirmed / facing.max(confirmed).max(1e-9);
-                (number, self.weighed(transform, Some(Shares { confirmed, wrong, visible }), is_free))
+                let seen = Seen { confirmed, wrong, visible, cosines };
+                (number, self.weighed(transform, Some(&seen), is_free))
             };
             numbers.iter().map(judged).collect::<Vec<_>>()
         };
@@ -129,22 +138,24 @@ impl<'a> ModelView<'a> {
     }
 
     /// The evidence, by what depth images say where it is known from where all was seen.
-    fn weighed(&self, transform: &RigidTransform, seen: Option<Shares>, is_free: &[bool]) -> Evidence {
-        let score = |shares: &Shares| (shares.confirmed - shares.wrong) / self.most_seen;
+    fn weighed(&self, transform: &RigidTransform, seen: Option<&Seen>, is_free: &[bool]) -> Evidence {
+        let score = |shares: &Seen| (shares.confirmed - shares.wrong) / self.most_seen;
         if let Some(shares) = seen.filter(|shares| score(shares) <= 0.0) {
-            return Evidence { score: score(&shares), visible: shares.visible, overlap: 0.0 };
+            return Evidence { score: score(shares), visible: shares.visible, overlap: 0.0 };
         }
         let moved: Vec<SurfacePlace> =
             self.samples.iter().map(|sample| transformed(transform, sample)).collect();
         let touching = self.settings.touching_distance * self.scene.voxel;
+        let faces_away = |sample: usize| seen.is_some_and(|seen| seen.cosines[sample] < FACING_AWAY);
+        let nearest = |sample: usize| self.scene.surface.nearest(&moved[sample], touching);
         let nearest: Vec<Option<usize>> =
-            moved.iter().map(|sample| self.scene.surface.nearest(sample, touching)).collect();
+            (0..moved.len()).map(|sample| if faces_away(sample) { None } else { nearest(sample) }).collect();
         let is_touching: Vec<bool> =
             nearest.iter().map(|near| near.is_some_and(|sample| is_free[sample])).collect();
         let share = |count: usize| count as f64 / self.samples.len().max(1) as f64;
         let overlap = share(nearest.iter().flatten().count());
         let (score, visible) = match seen {
-            Some(shares) => (score(&shares), shares.visible),
+            Some(shares) => (score(shares), shares.visible),
             None => {
                 let confirmed = share(is_touching.iter().filter(|&&touches| touches).count());
                 (self.settings.unknown_free_space_weight * confirmed / self.most_seen, confirmed)
@@ -160,17 +171,6 @@ impl<'a> ModelView<'a> {
             * self.rim.ends(transform, &is_touching, &self.scene, is_free)
             * self.agreement(on().filter_map(|sample| Some((&moved[sample], nearest[sample]?))));
         Evidence { score, visible, overlap }
-    }
-
-    /// Share of the samples that face a viewpoint.
-    fn facing(&self, transform: &RigidTransform, viewpoint: [f64; 3]) -> f64 {
-        // In the model's axes only one point has to be moved.
-        let from = transform.inverse().transform_point(viewpoint).map(|x| x as f32);
-        let faces = |sample: &&SurfacePlace| {
-            let towards = [0, 1, 2].map(|k| from[k] - sample.place[k]);
-            dot(&sample.normal, &towards) > FACING * dot(&towards, &towards).sqrt()
-        };
-        self.samples.iter().filter(faces).count() as f64 / self.samples.len().max(1) as f64
     }
 
     /// 1 where samples lie as close to the scene's as those of the same surface do, 0 where they touch by chance.

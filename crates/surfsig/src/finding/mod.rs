@@ -121,7 +121,7 @@ fn candidates_of<'a>(
         if model.places.radius < least { model.with_radius(least, monitor)? } else { model.clone() };
     let voxel = scene.voxel(&model)?;
     tick("voxel");
-    let places = scene.places(model.places.radius)?;
+    let places = scene.places(model.places.radius, voxel)?;
     tick(&format!("{} places", places.len()));
     let (coarse, fine) = (scene.coarse_surface(voxel)?, scene.fine_surface(voxel)?);
     tick(&format!("surfaces {} {}", coarse.samples().len(), fine.samples().len()));
@@ -156,9 +156,9 @@ fn candidates_of<'a>(
         if tried.is_empty() {
             continue;
         }
-        let last = view(&fine, usize::MAX);
+        let last = view(&fine, settings.fine_points);
         tick(&format!("last view {}", last.samples.len()));
-        let aligned = last.aligned(&tried, settings.fine_distances, settings.fine_points);
+        let aligned = last.aligned(&tried, settings.fine_distances, settings.aligned_points);
         tick("aligned");
         let judged = last.judged(&aligned, &vec![true; fine.samples().len()]);
         tick("judged");

@@ -95,7 +95,7 @@ impl Model {
             let text = "a model's points must lie on a surface: these have no normals";
             return Err(Error::InvalidModel(text.into()));
         }
-        let places = described(&scan, radius, monitor)?;
+        let places = described(&scan, &samples, radius, monitor)?;
         Ok(Self {
             center: scan.center,
             spacing,

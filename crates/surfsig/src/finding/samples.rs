@@ -4,11 +4,15 @@ use crate::depth_image::SurfacePlace;
 use crate::extract::extract_within;
 use crate::field::signatures_within;
 use crate::orientation::directions_within;
+use crate::random::some_of;
 use crate::scan::{CenteredScan, median};
+use crate::voxels::voxel_of;
 use crate::{
     Error, ExtractOptions, FieldOptions, FieldPlaces, Monitor, Queries, Radius, voxel_representatives,
 };
 use nalgebra::Vector3;
+use rayon::prelude::*;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Voxels: the radius of the balls from which normals are taken.
 const NORMAL_BALL: f64 = 3.0;
@@ -18,6 +22,12 @@ const UNKNOWNS: f64 = 6.0;
 const DESCRIPTION_VOXELS: f64 = 24.0;
 /// Places with a signature along a patch's radius.
 const PLACES_PER_RADIUS: f64 = 4.0;
+/// Cells along a patch's radius in which normals are compared.
+const CELLS_PER_RADIUS: i64 = 2;
+/// Length of the mean normal around a cell from which on it is flat: of a cap of a sphere of eleven patch radii.
+const FLAT: f64 = 0.998;
+/// Points that tell the noise of all.
+const MEASURED: usize = 2000;
 /// Voxels along a patch's radius between points whose sides are told from each other's.
 const ORIENTATION_VOXELS: f64 = 10.0;
 /// Points of a surface, one per voxel, with unit normals on its outer side.
@@ -31,38 +41,51 @@ pub(super) struct Samples {
 impl Samples {
     /// Those of a scan, whose viewpoint or directions say on which side its normals are.
     pub fn new(scan: &CenteredScan, voxel: f64, monitor: &Monitor) -> Result<Self, Error> {
-        let given = scan.scan();
-        let chosen = voxel_representatives(&given.cloud, Radius::new(voxel)?)?;
-        let directions: Option<Vec<[f32; 3]>> =
-            given.directions.map(|all| chosen.iter().map(|&i| all[i as usize]).collect());
+        let ball = Radius::new(NORMAL_BALL * voxel)?;
+        let thinned = scan.thinned(voxel);
+        let given = thinned.scan();
         let options = ExtractOptions {
             viewpoint: given.viewpoint,
-            directions: directions.as_deref(),
+            directions: given.directions,
             ..Default::default()
         };
-        let ball = Radius::new(NORMAL_BALL * voxel)?;
-        let queries = Queries::Indices(&chosen);
-        let found = extract_within(&given.cloud, ball.into(), &queries, &options, &monitor.apart())?;
-        let noise = (0..chosen.len()).filter_map(|i| {
-            let count = f64::from(found.count[i]);
-            let noise = f64::from(found.residual[i]) * (count / (count - UNKNOWNS)).sqrt();
-            (count > UNKNOWNS && noise.is_finite()).then_some(noise)
-        });
-        let noise = median(noise.collect()).unwrap_or(0.0);
-        let known = (0..chosen.len()).filter(|&i| found.normals[i].iter().all(|c| c.is_finite()));
+        let found = extract_within(&given.cloud, ball.into(), &Queries::All, &options, &monitor.apart())?;
+        let known = (0..found.len()).filter(|&i| found.normals[i].iter().all(|c| c.is_finite()));
         let point = |i: usize| SurfacePlace {
-            place: scan.points[chosen[i] as usize].map(|x| x as f32),
+            place: thinned.points[i].map(|x| x as f32),
             normal: found.normals[i],
         };
-        Ok(Self { points: known.map(point).collect(), noise })
+        Ok(Self { points: known.map(point).collect(), noise: noise(scan, ball, monitor)? })
     }
 }
 
-/// Places all over a scan with their signatures.
-pub(super) fn described(scan: &CenteredScan, radius: f64, monitor: &Monitor) -> Result<FieldPlaces, Error> {
-    let thinned = scan.thinned(radius / DESCRIPTION_VOXELS);
+/// Standard deviation of the points from the surface in a ball; the median of some.
+fn noise(scan: &CenteredScan, ball: Radius, monitor: &Monitor) -> Result<f64, Error> {
+    let some: Vec<u32> = some_of(scan.points.len(), MEASURED).into_iter().map(|i| i as u32).collect();
+    let cloud = scan.scan().cloud;
+    let options = ExtractOptions::default();
+    let found =
+        extract_within(&cloud, ball.into(), &Queries::Indices(&some), &options, &monitor.apart())?;
+    let deviation = |i: usize| {
+        let count = f64::from(found.count[i]);
+        let deviation = f64::from(found.residual[i]) * (count / (count - UNKNOWNS)).sqrt();
+        (count > UNKNOWNS && deviation.is_finite()).then_some(deviation)
+    };
+    Ok(median((0..found.len()).filter_map(deviation).collect()).unwrap_or(0.0))
+}
+
+/// Places all over a scan with their signatures, but where its surface is flat: a patch of a plane is nowhere.
+pub(super) fn described(
+    scan: &CenteredScan,
+    samples: &[SurfacePlace],
+    radius: f64,
+    monitor: &Monitor,
+) -> Result<FieldPlaces, Error> {
+    let cells = NormalCells::new(samples, radius);
+    let thinned = scan.thinned(radius / DESCRIPTION_VOXELS).some(|point| cells.is_around(point));
     let given = thinned.scan();
-    let indices = voxel_representatives(&given.cloud, Radius::new(radius / PLACES_PER_RADIUS)?)?;
+    let mut indices = voxel_representatives(&given.cloud, Radius::new(radius / PLACES_PER_RADIUS)?)?;
+    indices.retain(|&i| cells.is_bent(&thinned.points[i as usize]));
     let points: Vec<[f64; 3]> = indices.iter().map(|&i| thinned.points[i as usize]).collect();
     let options = FieldOptions {
         viewpoint: given.viewpoint,
@@ -73,6 +96,59 @@ pub(super) fn described(scan: &CenteredScan, radius: f64, monitor: &Monitor) -> 
     let found =
         signatures_within(&given.cloud, Radius::new(radius)?, &queries, &options, &monitor.apart())?;
     Ok(FieldPlaces::known(radius, &indices, &points, &found))
+}
+
+/// Where a surface is bent, in cells of a part of a patch's radius.
+struct NormalCells {
+    edge: f64,
+    /// Cells around which normals differ.
+    bent: FxHashSet<[i64; 3]>,
+    /// Those and the cells that patches there reach.
+    around: FxHashSet<[i64; 3]>,
+}
+
+impl NormalCells {
+    fn new(samples: &[SurfacePlace], radius: f64) -> Self {
+        let edge = radius / CELLS_PER_RADIUS as f64;
+        let mut sums: FxHashMap<[i64; 3], (Vector3<f64>, f64)> = FxHashMap::default();
+        for sample in samples {
+            let cell = voxel_of(&sample.place.map(f64::from), edge);
+            let (sum, count) = sums.entry(cell).or_insert((Vector3::zeros(), 0.0));
+            *sum += Vector3::from(sample.normal.map(f64::from));
+            *count += 1.0;
+        }
+        let is_bent = |cell: &[i64; 3]| {
+            let (mut total, mut number) = (Vector3::zeros(), 0.0);
+            for (sum, count) in block(*cell, CELLS_PER_RADIUS).filter_map(|other| sums.get(&other)) {
+                total += sum;
+                number += count;
+            }
+            total.norm() < FLAT * number
+        };
+        let cells: Vec<[i64; 3]> = sums.keys().copied().collect();
+        let bent: FxHashSet<[i64; 3]> = cells.par_iter().filter(|cell| is_bent(cell)).copied().collect();
+        let is_around = |cell: &[i64; 3]| {
+            bent.contains(cell) || block(*cell, CELLS_PER_RADIUS + 1).any(|other| bent.contains(&other))
+        };
+        let around = cells.par_iter().filter(|cell| is_around(cell)).copied().collect();
+        Self { edge, bent, around }
+    }
+
+    fn is_bent(&self, point: &[f64; 3]) -> bool {
+        self.bent.contains(&voxel_of(point, self.edge))
+    }
+
+    fn is_around(&self, point: &[f64; 3]) -> bool {
+        self.around.contains(&voxel_of(point, self.edge))
+    }
+}
+
+/// The cells of a cube around one, `reach` to each side.
+fn block(cell: [i64; 3], reach: i64) -> impl Iterator<Item = [i64; 3]> {
+    let steps = move || -reach..=reach;
+    steps().flat_map(move |x| {
+        steps().flat_map(move |y| steps().map(move |z| [cell[0] + x, cell[1] + y, cell[2] + z]))
+    })
 }
 
 /// A scan with directions that are on one side of each piece of its surface: most of them away from its centre.

@@ -91,12 +91,13 @@ impl<'a> Scene<'a> {
         Ok(voxel.max(self.settings.noises_per_voxel * self.samples(voxel)?.noise))
     }
 
-    /// Its places with signatures of patches of a radius.
-    pub fn places(&mut self, radius: f64) -> Result<Arc<FieldPlaces>, Error> {
+    /// Its places with signatures of patches of a radius; `voxel` is that of the samples that tell where it is flat.
+    pub fn places(&mut self, radius: f64, voxel: f64) -> Result<Arc<FieldPlaces>, Error> {
         if let Some((_, known)) = self.places.iter().find(|(of, _)| *of == radius) {
             return Ok(Arc::clone(known));
         }
-        let places = Arc::new(described(&self.scan, radius, self.monitor)?);
+        let samples = self.samples(voxel)?;
+        let places = Arc::new(described(&self.scan, &samples.points, radius, self.monitor)?);
         self.places.push((radius, Arc::clone(&places)));
         Ok(places)
     }

@@ -14,7 +14,7 @@ pub struct FindSettings {
     pub min_score: f64,
     /// Proposed transforms that are judged by few points.
     pub proposals: usize,
-    /// Those of them that are judged by all points.
+    /// Transforms that are aligned and judged by most points.
     pub tried: usize,
     /// Distance between the points of the surface, in the scene's point spacings at least: steep surfaces have fewer
     /// points.
@@ -35,7 +35,9 @@ pub struct FindSettings {
     pub coarse_distances: (f64, f64, usize),
     /// Likewise of the last.
     pub fine_distances: (f64, f64, usize),
-    /// Points of the model in the last alignment; it is judged by all.
+    /// Points of the model in the last alignment.
+    pub aligned_points: usize,
+    /// Points of the model in the last judgement.
     pub fine_points: usize,
     /// Patch radii, and radians, within which two proposed transforms agree.
     pub agreement: [f64; 2],
@@ -82,7 +84,8 @@ impl Default for FindSettings {
             coarse_points: 300,
             coarse_distances: (2.5, 1.5, 4),
             fine_distances: (2.5, 1.5, 5),
-            fine_points: 1500,
+            aligned_points: 1000,
+            fine_points: 3000,
             agreement: [0.5, 0.35],
             merged_share: 0.5,
             same: [0.25, 0.2],

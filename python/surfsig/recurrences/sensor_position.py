@@ -1,4 +1,4 @@
-"""Where the sensor stood: as the cloud knows it, or as shadows tell; and its second place, if it has one."""
+"""Where the sensor stood: as the cloud knows it, or as shadows tell; and its second viewpoint."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FAR = 100.0
 """Of the extent of what was looked at, how far away a sensor is taken to be whose place is not known."""
 
 
-class Standpoint:
+class SensorPosition:
     """Where pieces were seen from; coordinates are those of the cloud's offsets."""
 
     def __init__(self, cloud: PointCloud, regions: Sequence[Region], spacing: float) -> None:
@@ -30,19 +30,19 @@ class Standpoint:
             If the cloud does not know its viewpoint, and there are no shadows that tell it.
         """
         self._cloud = cloud
-        self.place: Array | None = None
+        self.viewpoint: Array | None = None
         """For all pieces, (3,); None where the cloud has a viewpoint for each scan."""
         if cloud.viewpoints is None:
             known = cloud.viewpoint
-            self.place = _guessed(regions, spacing) if known is None else np.asarray(known - cloud.origin)
-        eyes = [self.eye(region.piece) for region in regions]
-        self.second = second_place(regions, eyes, spacing)
-        """The shift (3,) to where points had to be seen from, too, as a camera beside a laser; or None."""
+            self.viewpoint = _guessed(regions, spacing) if known is None else np.asarray(known - cloud.origin)
+        viewpoints = [self.viewpoint_of(region.piece) for region in regions]
+        self.second = second_place(regions, viewpoints, spacing)
+        """The translation (3,) to a second viewpoint, as of a camera beside a laser, or None."""
 
-    def eye(self, piece: NDArray[np.int64]) -> Array:
+    def viewpoint_of(self, piece: NDArray[np.int64]) -> Array:
         """Give where the piece with these points was seen from: in a sweep, the mean of their viewpoints."""
-        if self.place is not None:
-            return self.place
+        if self.viewpoint is not None:
+            return self.viewpoint
         assert self._cloud.viewpoints is not None
         scans = self._cloud.fields["scan"][piece]
         return np.asarray(self._cloud.viewpoints[scans].mean(axis=0) - self._cloud.origin)
