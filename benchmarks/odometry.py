@@ -1,21 +1,27 @@
-"""Follow simulated sensors through a building: drift, errors beside covariances, speed, and ways back.
+"""Follow simulated sensors through a building: drift, errors beside covariances, speed, and relocalisation.
 
 python benchmarks/odometry.py --write
 
-No real sequence is part of this. The second table carries the sensor away: to places near its way, to a
-building with the same walls and other furniture, and to one with other walls.
+No real sequence is part of this. The first table has KISS-ICP beside surfsig on the same scans, with the
+voxel of its default settings (1 m, made for streets) and with one of 0.3 m. The second table carries the
+sensor away: to places near its trajectory, to a building with the same walls and other furniture, and to one
+with other walls.
 """
 
 from __future__ import annotations
 
 import argparse
+import tempfile
 import time
+from pathlib import Path
+from typing import Any
 
 import moving_sensor
 import numpy as np
 from machine import measured_here
 from moving_sensor import Array, Lidar
 from numpy.typing import NDArray
+from peers import HERE, PeerUnavailable, peer_python, run_json
 from report import Row, markdown_table, measured_on, publish
 from rich.progress import track
 
@@ -33,7 +39,10 @@ SENSORS = {
 WAY_COLUMNS = (
     "sensor", "scans", "points each", "tracked", "largest error of place", "of the way", "of direction",
     "error² over covariance", "processor time a scan",
+    "KISS-ICP, 1 m: largest error, processor time", "KISS-ICP, 0.3 m",
 )  # fmt: skip
+KISS_VOXELS = (1.0, 0.3)
+"""Metres: its default, and what suits rooms better. With 0.15 m it takes two to four times as long."""
 BACK_COLUMNS = ("sensor", "carried to", "places", "found, right", "found, wrong", "lost")
 BACK_SENSORS = ("lidar, 32 rings", "camera, 90° x 60°")
 PLACES = ("a mapped place", "the same walls, other furniture", "other walls")
@@ -51,7 +60,7 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="update BENCHMARKS.md")
     parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS, help="buildings of the second table")
     arguments = parser.parse_args()
-    facts = measured_here()
+    facts = measured_here(peer_versions())
     ways = [follow(name, *sensor) for name, sensor in track(SENSORS.items(), "following")]
     back: list[Row] = []
     for sensor in BACK_SENSORS:
@@ -90,7 +99,32 @@ def follow(name: str, lidar: Lidar, count: int) -> Row:
         f"{np.degrees(np.nanmax(turned)):.3f}°",
         f"{nees.mean():.1f}",
         f"{1000 * seconds / count:.0f} ms",
+        *(by_kiss(scans, true, voxel) for voxel in KISS_VOXELS),
     )
+
+
+def by_kiss(scans: list[surfsig.PointCloud], true: Array, voxel: float) -> str:
+    """Let KISS-ICP follow the same scans, and give its largest error of place and processor time a scan."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "scans.npz"
+        arrays: dict[str, Any] = {f"scan{number}": scan.points for number, scan in enumerate(scans)}
+        np.savez(file, **arrays)
+        try:
+            program: list[str | Path] = [peer_python(), HERE / "odometry_peers.py", file]
+            answer = run_json([*program, "--voxel", str(voxel)], threads=1)
+        except PeerUnavailable as error:
+            return f"not run: {error}"
+    off, _ = moving_sensor.errors(np.array(answer["poses"]), true)
+    return f"{1000 * off.max():.0f} mm, {1000 * answer['seconds'] / len(scans):.0f} ms"
+
+
+def peer_versions() -> dict[str, str]:
+    """Give that of KISS-ICP, where it is installed."""
+    try:
+        answer = run_json([peer_python(), HERE / "odometry_peers.py", "versions"], threads=1)
+    except PeerUnavailable:
+        return {}
+    return {name: str(text) for name, text in answer.items()}
 
 
 def carry_away(seed: int, lidar: Lidar) -> NDArray[np.int64]:

@@ -117,6 +117,17 @@ class Registration(Structure):
     )
 
 
+class ScanPose(Structure):
+    """A surfsig_scan_pose."""
+
+    _fields_ = (
+        ("status", c_uint8),
+        ("overlap", c_double),
+        ("T_map_scan", Transform),
+        ("covariance", c_double * 36),
+    )
+
+
 @dataclass
 class Options:
     """What the setters are called with."""
@@ -146,15 +157,20 @@ class CInterface:
 
     def __post_init__(self) -> None:
         self.functions = f = ctypes.CDLL(str(self.library))
-        for name in ("version", "last_error", "status_name", "surface_kind_name"):
+        for name in ("version", "last_error", "status_name", "surface_kind_name", "scan_status_name"):
             getattr(f, f"surfsig_{name}").restype = c_char_p
         for name in ("options_new", "surface_options_new", "registration_options_new"):
             getattr(f, f"surfsig_{name}").restype = c_void_p
-        sizes = ("cloud_size", "extraction_size", "surfaces_size", "surfaces_label_count")
+        sizes = ("cloud_size", "extraction_size", "surfaces_size", "surfaces_label_count", "odometry_size")
         for name in (*sizes, "surface_kind_parameters"):
             getattr(f, f"surfsig_{name}").restype = c_size_t
         numbers = ("radius", "major_radius", "half_angle", "independent_error")
-        for name in ("similarity", "extraction_radius", *(f"primitive_{number}" for number in numbers)):
+        for name in (
+            "similarity",
+            "extraction_radius",
+            "odometry_voxel",
+            *(f"primitive_{number}" for number in numbers),
+        ):
             getattr(f, f"surfsig_{name}").restype = c_double
         for name in ("primitive_point", "primitive_axis", "surfaces_covariance"):
             getattr(f, f"surfsig_{name}").restype = POINTER(c_double)

@@ -1,10 +1,11 @@
-"""The C interface's registration: values are Python's, bit for bit."""
+"""The C interface's registration and odometry: values are Python's, bit for bit."""
 
-from ctypes import byref, c_double, c_uint32, c_void_p
+from ctypes import byref, c_double, c_size_t, c_uint32, c_void_p
+from pathlib import Path
 
 import numpy as np
 import pytest
-from c_interface import PROGRESS, CInterface, Failed, Registration, Scan, Transform, address
+from c_interface import PROGRESS, CInterface, Failed, Registration, Scan, ScanPose, Transform, address
 from register_scenes import moved, pose, terrain
 
 import surfsig
@@ -99,3 +100,34 @@ def test_a_registration_is_stopped(c: CInterface, scans: tuple[np.ndarray, np.nd
     large = np.concatenate([scans[0] + 0.001 * k for k in range(40)])
     with pytest.raises(Failed, match=f"^{CANCELLED}: "):
         registered(c, large, large, stop=1)
+
+
+def test_odometry_is_that_of_python(c: CInterface, tmp_path: Path) -> None:
+    rng = np.random.default_rng(SEED)
+    world = terrain(rng, 40_000, -2.0, 2.0)
+    scans = []
+    for step in range(5):
+        seen = world[np.abs(world[:, 0] - 0.05 * step) < 1.5] + rng.normal(0.0, 0.001, 3)
+        scans.append(np.ascontiguousarray(seen[::3] - np.array([0.05 * step, 0.0, 2.0])))
+        surfsig.write(tmp_path / f"{step}.ply", PointCloud(scans[-1]))
+    expected = surfsig.estimate_odometry(tmp_path, threads=1)
+    f, made, pose = c.functions, c_void_p(), ScanPose()
+    zero = c_double(0.0)
+    c.check(f.surfsig_odometry_new(zero, zero, zero, c_uint32(2), byref(made)))
+    try:
+        for number, scan in enumerate(scans):
+            with c.cloud_of(scan) as cloud:
+                given = Scan(cloud, None, None)
+                c.check(f.surfsig_odometry_push(made, byref(given), byref(pose)))
+            assert pose.status == expected.status[number]
+            assert f.surfsig_scan_status_name(pose.status) == b"tracked"
+        assert f.surfsig_odometry_size(made) == len(scans)
+        assert f.surfsig_odometry_voxel(made) == expected.voxel
+        for number in range(len(scans)):
+            c.check(f.surfsig_odometry_pose(made, c_size_t(number), byref(pose)))
+            np.testing.assert_array_equal(pose.T_map_scan.array(), expected.poses[number])
+            covariance = np.array(pose.covariance[:]).reshape(6, 6)
+            np.testing.assert_array_equal(covariance, expected.covariances[number])
+            assert pose.overlap == expected.overlaps[number]
+    finally:
+        f.surfsig_odometry_free(made)

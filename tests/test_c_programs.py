@@ -189,6 +189,11 @@ def test_the_examples(installed: Path, tmp_path: Path, target: str) -> None:
     said, *_ = run(build / "registration").splitlines()
     assert said.startswith("trusted, overlap 0.")
 
+    # That scans lie within a centimetre of where they were is the program's own condition.
+    scans = run(build / "odometry").splitlines()
+    assert len(scans) == 12
+    assert all(": tracked, " in scan for scan in scans)
+
 
 def test_the_makefile_installs_where_it_is_told(tmp_path: Path, installed: Path) -> None:
     run("make", "-C", ROOT, "install-c", f"PREFIX={tmp_path}")

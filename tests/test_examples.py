@@ -101,7 +101,6 @@ def test_surfaces(shared_data: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_find_again(shared_data: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    pytest.importorskip("small_gicp")
     picture = tmp_path / "again.png"
     lines = run(EXAMPLES / "find_again.py", shared_data, picture)
     assert any(re.match(r"trusted +yes", line) for line in lines)

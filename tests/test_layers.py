@@ -45,7 +45,7 @@ PYTHON_EXCEPTIONS = {
 RUST_FLOORS = (
     ("error",),
     ("geometry", "similarity", "point_cloud", "random", "threads", "moments", "monitor", "status"),
-    ("lattice", "resolution", "depth_image", "kd_tree", "voxels"),
+    ("lattice", "resolution", "depth_image", "visibility", "kd_tree", "voxels"),
     ("simd",),
     ("cell_index", "tensor", "scan", "neighbor_distances"),
     ("ball", "curvature", "spacing"),
@@ -54,7 +54,7 @@ RUST_FLOORS = (
     ("extract",),
     ("field", "primitive", "orientation"),
     ("surfaces", "alignment"),
-    ("registration", "finding"),
+    ("registration", "finding", "odometry"),
 )
 """Modules of the core, the lowest floor first."""
 

@@ -1,4 +1,4 @@
-"""The way of a simulated lidar through a building, whose truth is known."""
+"""The trajectory of a simulated lidar through a building, whose truth is known."""
 
 from __future__ import annotations
 
@@ -12,12 +12,8 @@ from numpy.typing import NDArray
 
 import surfsig
 from surfsig import InvalidInputError, Odometry, PointCloud, ScanStatus, TimedScan, simulate
+from surfsig._surfsig import SCAN_STATUS_NAMES
 from surfsig.geometry import adjoint
-from surfsig.odometry.alignment import Alignment, Scan
-from surfsig.odometry.local_map import LocalMap
-from surfsig.odometry.panorama import Panorama
-from surfsig.odometry.scale import Scale
-from surfsig.odometry.usual import Usual
 
 Array = NDArray[np.float64]
 
@@ -81,22 +77,6 @@ def test_a_sensor_that_was_carried_away_is_found_again(walk: Walk) -> None:
 
 
 @pytest.mark.slow
-def test_what_no_scan_alone_is_sure_of_waits_for_the_next_ones(
-    walk: Walk, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The third scan gives all three their poses; a sequence that ends before leaves them lost."""
-    monkeypatch.setattr(Usual, "is_sure", lambda *_: False)
-    carried = [*range(0, 18, 2), 1, 2, 3]
-    scans = [walk.scans[number] for number in carried]
-    result = surfsig.estimate_odometry(scans)
-    assert result.status.tolist() == [0] * 9 + [ScanStatus.RELOCALISED, 0, 0]
-    off, _ = moving_sensor.errors(result.poses, walk.true[carried])
-    assert off.max() < 0.03
-    assert np.isfinite(result.covariances).all()
-    assert surfsig.estimate_odometry(scans[:-1]).status.tolist() == [0] * 9 + [ScanStatus.LOST] * 2
-
-
-@pytest.mark.slow
 def test_a_building_with_the_same_walls_was_taken_for_the_mapped_one(walk: Walk) -> None:
     other = moving_sensor.building(100)
     away = [moving_sensor.scan(other, walk.true[number], 1000 + number) for number in (3, 4, 12)]
@@ -130,29 +110,6 @@ def test_something_that_moves_before_the_sensor_does_not_end_the_way(walk: Walk)
     assert result.counts()["tracked"] == 16
     off, _ = moving_sensor.errors(result.poses, walk.true[:16])
     assert off.max() < 0.02
-
-
-def test_what_is_usual_is_what_the_last_scans_did() -> None:
-    def lying(overlap: float, seen_through: float = 0.0, unexplained: float = 0.0) -> Alignment:
-        nothing = np.zeros(0, np.int64)
-        return Alignment(np.eye(4), np.eye(6), overlap, seen_through, unexplained, True, nothing)
-
-    usual = Usual()
-    # Before any scan only overlap and what was looked through say something.
-    assert usual.fits(lying(0.4, 0.0, 0.9))
-    assert not usual.fits(lying(0.3))
-    for unexplained in (0.0, 0.03, 0.01):
-        usual.add(lying(0.8, 0.02, unexplained))
-    assert usual.fits(lying(0.69, 0.029, 0.044))
-    assert not usual.fits(lying(0.67))
-    assert not usual.fits(lying(0.8, 0.031))
-    assert not usual.fits(lying(0.8, 0.0, 0.046))
-    assert usual.is_sure(lying(0.75, 0.0, 0.019))
-    assert not usual.is_sure(lying(0.74))
-    assert not usual.is_sure(lying(0.8, 0.0, 0.021))
-    assert usual.may_be_new(lying(0.5, 0.06, 0.22))
-    assert not usual.may_be_new(lying(0.5, 0.0, 0.24))
-    assert not usual.may_be_new(lying(0.5, 0.08, 0.0))
 
 
 def test_scans_without_a_place_do_not_stop_the_rest(walk: Walk) -> None:
@@ -267,36 +224,6 @@ def test_mistakes_are_told() -> None:
         surfsig.estimate_odometry(cloud)  # type: ignore[arg-type]
 
 
-def test_the_map_keeps_the_first_place_of_each_voxel() -> None:
-    places = LocalMap(threads=1)
-    places.add(np.array([[0.2, 0.2, 0.2], [0.8, 0.1, 0.5], [-0.1, 0.0, 0.0]]), 0)
-    places.add(np.array([[0.9, 0.9, 0.9], [5.5, 0.0, 0.0]]), 7)
-    rows = {tuple(point): scan for point, scan in zip(places.points.tolist(), places.scans, strict=True)}
-    assert rows == {(0.2, 0.2, 0.2): 0, (-0.1, 0.0, 0.0): 0, (5.5, 0.0, 0.0): 7}
-    places.keep_within(np.zeros(3), 1.0)
-    assert len(places) == 2
-
-
-def test_the_voxel_is_filled_as_often_as_said() -> None:
-    points = np.random.default_rng(2).uniform(0, [10.0, 7.0, 0.0], (50_000, 3))
-    scale = Scale.of(points, None)
-    assert len(Scan(points / scale.voxel, 1)) == pytest.approx(4000, rel=0.02)
-    sparse = points[:1000]
-    assert len(Scan(sparse / Scale.of(sparse, None).voxel, 1)) == pytest.approx(800, rel=0.02)
-
-
-def test_what_a_scan_looked_through() -> None:
-    """A ball of radius 50 around the sensor: what is within was looked through, what is beyond is hidden."""
-    rng = np.random.default_rng(3)
-    ways = rng.normal(size=(40_000, 3))
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    # Nothing was measured upwards.
-    seen = Panorama(50.0 * ways[ways[:, 2] < 0.5])
-    down, up = ways[ways[:, 2] < 0.4][:1000], ways[ways[:, 2] > 0.6][:1000]
-    assert seen.seen_through(30.0 * down) == 1.0
-    assert seen.seen_through(49.0 * down) == 0.0
-    assert seen.seen_through(80.0 * down) == 0.0
-    assert seen.seen_through(30.0 * up) == 0.0
-    both = np.concatenate([30.0 * down[:100], 50.0 * down[100:400], 80.0 * down[400:]])
-    assert seen.seen_through(both) == 0.25
-    assert seen.covers(both).tolist() == [True] * 400 + [False] * 600
+def test_statuses_have_the_numbers_and_names_of_the_core() -> None:
+    assert [status.name.lower() for status in ScanStatus] == SCAN_STATUS_NAMES
+    assert [int(status) for status in ScanStatus] == list(range(len(SCAN_STATUS_NAMES)))

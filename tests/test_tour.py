@@ -10,7 +10,6 @@ import pytest
 pytest.importorskip("matplotlib")
 pytest.importorskip("pandas")
 pytest.importorskip("pyarrow")
-pytest.importorskip("small_gicp")
 
 ROOT = Path(__file__).parents[1]
 SCRIPT = runpy.run_path(str(ROOT / "examples" / "tour.py"))

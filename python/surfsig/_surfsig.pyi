@@ -13,11 +13,13 @@ __all__ = [
     "INSTRUCTION_SET",
     "KIND_PARAMETERS",
     "OPTIMAL",
+    "SCAN_STATUS_NAMES",
     "STATUS_NAMES",
     "DepthImage",
     "E57Reader",
     "FindSettings",
     "Frame",
+    "Odometry",
     "Primitive",
     "RegistrationSettings",
     "SurfacePlaces",
@@ -46,6 +48,7 @@ _Places = tuple[
 ]
 
 __version__: str
+SCAN_STATUS_NAMES: list[str]
 STATUS_NAMES: list[str]
 KIND_PARAMETERS: dict[str, int]
 FEWEST_SURFACE_POINTS: int
@@ -181,7 +184,7 @@ class RegistrationSettings:
     @property
     def trusted_overlap_of_start(self) -> float:
         """Overlap from which on a transform is trusted that the caller gave roughly."""
-    def __eq__(self, other: object) -> bool: ...
+    def __eq__(self, value: object, /) -> bool: ...
 
 def register(
     source: _Scan,
@@ -417,6 +420,28 @@ class Frame:
     def signatures_of_surfaces(
         self, surfaces: NDArray[np.float32], *, side: float
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]: ...
+
+@final
+class Odometry:
+    def __new__(
+        cls,
+        *,
+        voxel: float | None = None,
+        max_correspondence_distance: float | None = None,
+        map_range: float | None = None,
+        threads: int | None = None,
+    ) -> Odometry: ...
+    def push(
+        self,
+        points: NDArray[np.floating],
+        *,
+        origin: Sequence[float],
+        viewpoint: Sequence[float] | None = None,
+    ) -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def voxel(self) -> float | None: ...
+    def arrays(self) -> dict[str, NDArray[Any]]: ...
 
 @final
 class Primitive:

@@ -17,6 +17,7 @@
 #ifndef SURFSIG_H
 #define SURFSIG_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -64,6 +65,39 @@ typedef enum {
    */
   SURFSIG_CODE_CANCELLED = 5,
 } surfsig_code;
+
+/**
+ * Why a scan has the pose that it has.
+ */
+enum surfsig_scan_status
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * Found next to where it was expected.
+   */
+  SURFSIG_SCAN_STATUS_TRACKED = 0,
+  /**
+   * Found by the signatures of its keypoints, after tracking had failed.
+   */
+  SURFSIG_SCAN_STATUS_RELOCALISED = 1,
+  /**
+   * Not found: no pose.
+   */
+  SURFSIG_SCAN_STATUS_LOST = 2,
+  /**
+   * It has hardly any points: no pose.
+   */
+  SURFSIG_SCAN_STATUS_TOO_FEW_POINTS = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum surfsig_scan_status surfsig_scan_status;
+#else
+typedef uint8_t surfsig_scan_status;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
 
 /**
  * What a surface is.
@@ -232,6 +266,12 @@ typedef struct surfsig_cloud surfsig_cloud;
 typedef struct surfsig_extraction surfsig_extraction;
 
 /**
+ * A sensor that is followed from scan to scan. Made by surfsig_odometry_new(), freed by surfsig_odometry_free(). It
+ * refers to nothing of the caller's.
+ */
+typedef struct surfsig_odometry surfsig_odometry;
+
+/**
  * How an extraction is done. Made by surfsig_options_new(), freed by surfsig_options_free().
  */
 typedef struct surfsig_options surfsig_options;
@@ -350,17 +390,6 @@ typedef struct {
 } surfsig_surface_point;
 
 /**
- * Told how far work is, some twenty times a second, by the thread that called surfsig; the work itself is done by
- * others meanwhile. Must return, neither by an exception nor by longjmp().
- *
- * @param data What was given with the function.
- * @param done How much is done.
- * @param total Of how much; the same for all calls.
- * @return 0 to go on; anything else stops the work, whose function then returns SURFSIG_CODE_CANCELLED.
- */
-typedef int (*surfsig_progress)(void *data, size_t done, size_t total);
-
-/**
  * A scan: its points, and what is known of where they were seen from.
  */
 typedef struct {
@@ -392,6 +421,40 @@ typedef struct {
    */
   double matrix[16];
 } surfsig_transform;
+
+/**
+ * A scan's pose in the map, whose frame is that of the first scan that has one.
+ */
+typedef struct {
+  /**
+   * Why the pose is what it is.
+   */
+  surfsig_scan_status status;
+  /**
+   * Share of the scan's points that lie on the map; 0 where there is no pose.
+   */
+  double overlap;
+  /**
+   * Takes the scan's points to the map; NaN where there is no pose.
+   */
+  surfsig_transform T_map_scan;
+  /**
+   * Of the twist m (rotation vector in radians, then translation) in the scan's own axes by which the pose is off,
+   * T_true = T_map_scan exp(m): 6 x 6, row by row. NaN where there is no pose.
+   */
+  double covariance[36];
+} surfsig_scan_pose;
+
+/**
+ * Told how far work is, some twenty times a second, by the thread that called surfsig; the work itself is done by
+ * others meanwhile. Must return, neither by an exception nor by longjmp().
+ *
+ * @param data What was given with the function.
+ * @param done How much is done.
+ * @param total Of how much; the same for all calls.
+ * @return 0 to go on; anything else stops the work, whose function then returns SURFSIG_CODE_CANCELLED.
+ */
+typedef int (*surfsig_progress)(void *data, size_t done, size_t total);
 
 /**
  * A motion that does not change a surface, so that a transform of it is not determined in that direction.
@@ -671,6 +734,66 @@ surfsig_code surfsig_fit_quadric(const double *moments, surfsig_quadric *quadric
 surfsig_code surfsig_quadric_nearest(const surfsig_quadric *quadric,
                                      const double *from,
                                      surfsig_surface_point *point);
+
+/**
+ * A status in words, as "tracked"; null for a number that is none. Null-terminated, never to be freed.
+ */
+const char *surfsig_scan_status_name(uint8_t status);
+
+/**
+ * Begins a sequence.
+ *
+ * @param voxel Edge of the voxels in which scans and map are thinned, in the scans' unit; 0 to take it from the first
+ * scan.
+ * @param max_correspondence_distance Largest distance between points that correspond, in the scans' unit; 0 to take it
+ * from how far off the last predictions were.
+ * @param map_range How far the map goes around the sensor, in the scans' unit; 0 to take it from the scans.
+ * @param threads 1 to 1024; 0 for all cores. The result is the same, bit for bit.
+ * @param odometry Where the result is put; null is put there where the call fails.
+ */
+surfsig_code surfsig_odometry_new(double voxel,
+                                  double max_correspondence_distance,
+                                  double map_range,
+                                  uint32_t threads,
+                                  surfsig_odometry **odometry);
+
+/**
+ * Ends a sequence; does nothing with null.
+ */
+void surfsig_odometry_free(surfsig_odometry *odometry);
+
+/**
+ * Takes the next scan, in its own frame, in which the sensor is at the viewpoint, or at 0 where none is given.
+ *
+ * A scan that is lost may still get a pose by the next ones: surfsig_odometry_pose() then gives it.
+ *
+ * @param odometry The sequence.
+ * @param scan The scan; its directions are not looked at.
+ * @param pose Where the scan's result is put; null where nobody wants it.
+ */
+surfsig_code surfsig_odometry_push(surfsig_odometry *odometry,
+                                   const surfsig_scan *scan,
+                                   surfsig_scan_pose *pose);
+
+/**
+ * Number of scans so far; 0 for null.
+ */
+size_t surfsig_odometry_size(const surfsig_odometry *odometry);
+
+/**
+ * Edge of the voxels in which scans and map are thinned, in the scans' unit; NaN before a scan has points, and for
+ * null.
+ */
+double surfsig_odometry_voxel(const surfsig_odometry *odometry);
+
+/**
+ * Gives what is known now of any scan so far.
+ *
+ * @param odometry The sequence.
+ * @param index Number of a scan, from 0.
+ * @param pose Where the result is put.
+ */
+surfsig_code surfsig_odometry_pose(const surfsig_odometry *odometry, size_t index, surfsig_scan_pose *pose);
 
 /**
  * Makes options of the default values: paraboloids in the surface's axes, no viewpoint, all cores, every point.

@@ -1,6 +1,6 @@
 /**
  * @file
- * Registration of scans in C++: included by surfsig.hpp.
+ * Registration of scans, and odometry, in C++: included by surfsig.hpp.
  */
 
 #ifndef SURFSIG_REGISTRATION_HPP
@@ -87,6 +87,43 @@ inline Registration register_scans(const Scan &source, const Scan &target, const
                                    const RegistrationOptions &options = RegistrationOptions()) {
   return detail::registered(source, target, &start.get(), options);
 }
+
+/** A scan's pose in the map; surfsig_scan_pose says what its numbers mean. */
+struct ScanPose : surfsig_scan_pose {
+  /** Takes the scan's points to the map; throws where the scan has no pose. */
+  Isometry transform() const { return Isometry(T_map_scan); }
+};
+
+/** Follows a sensor from scan to scan. */
+class Odometry {
+public:
+  /** Lengths are in the scans' unit; 0 to take one from the scans. */
+  explicit Odometry(double voxel = 0.0, double max_correspondence_distance = 0.0, double map_range = 0.0,
+                    std::uint32_t threads = 0) {
+    surfsig_odometry *made = nullptr;
+    check(surfsig_odometry_new(voxel, max_correspondence_distance, map_range, threads, &made));
+    handle_.reset(made);
+  }
+  /** Takes the next scan, in its own frame, in which the sensor is at the viewpoint, or at 0 where none is given. */
+  ScanPose push(const Scan &scan) {
+    const surfsig_scan given = scan.get();
+    ScanPose pose;
+    check(surfsig_odometry_push(handle_.get(), &given, &pose));
+    return pose;
+  }
+  /** Number of scans so far. */
+  std::size_t size() const { return surfsig_odometry_size(handle_.get()); }
+  /** What is known now of a scan, which may have got a pose by later ones. */
+  ScanPose pose(std::size_t index) const {
+    ScanPose pose;
+    check(surfsig_odometry_pose(handle_.get(), index, &pose));
+    return pose;
+  }
+  double voxel() const { return surfsig_odometry_voxel(handle_.get()); }
+
+private:
+  detail::Handle<surfsig_odometry, surfsig_odometry_free> handle_;
+};
 
 } // namespace surfsig
 

@@ -123,11 +123,7 @@ impl surfsig_registration {
         Self {
             found: found.T_target_source.is_some(),
             trusted: found.trusted,
-            T_target_source: found
-                .T_target_source
-                .map_or(surfsig_transform { matrix: [f64::NAN; 16] }, |transform| {
-                    surfsig_transform::of(&transform)
-                }),
+            T_target_source: surfsig_transform::or_nan(found.T_target_source.as_ref()),
             covariance,
             center: found.center,
             free_direction_count: found.free_directions.len(),

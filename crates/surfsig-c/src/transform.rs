@@ -23,6 +23,11 @@ impl surfsig_transform {
         Self { matrix }
     }
 
+    /// NaN where there is none.
+    pub(crate) fn or_nan(transform: Option<&RigidTransform>) -> Self {
+        transform.map_or(Self { matrix: [f64::NAN; 16] }, Self::of)
+    }
+
     pub(crate) fn checked(&self) -> Result<RigidTransform, Failure> {
         let row = |i: usize| std::array::from_fn(|j| self.matrix[4 * i + j]);
         Ok(RigidTransform::from_matrix(&[row(0), row(1), row(2), row(3)])?)

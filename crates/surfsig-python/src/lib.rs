@@ -7,6 +7,7 @@ mod field;
 mod finding;
 mod frame;
 mod neighbor_distances;
+mod odometry;
 mod primitive;
 mod python_file;
 mod registration;
@@ -70,6 +71,8 @@ mod _surfsig {
     #[pymodule_export]
     use crate::neighbor_distances::mean_neighbor_distances;
     #[pymodule_export]
+    use crate::odometry::Odometry;
+    #[pymodule_export]
     use crate::primitive::{Primitive, fit_primitive};
     #[pymodule_export]
     use crate::registration::{RegistrationSettings, consistent_directions, free_directions, register};
@@ -83,6 +86,7 @@ mod _surfsig {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("STATUS_NAMES", surfsig::Status::ALL.map(surfsig::Status::name).to_vec())?;
+        module.add("SCAN_STATUS_NAMES", surfsig::ScanStatus::ALL.map(surfsig::ScanStatus::name).to_vec())?;
         let parameters = surfsig::SurfaceKind::ALL.map(|kind| (kind.name(), kind.parameters()));
         module.add("KIND_PARAMETERS", parameters.into_py_dict(module.py())?)?;
         module.add("FEWEST_SURFACE_POINTS", surfsig::FEWEST_SURFACE_POINTS)?;

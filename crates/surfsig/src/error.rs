@@ -12,6 +12,14 @@ pub enum Error {
     /// The radius is zero, negative, infinite, not a number, or of no use in float32.
     #[error("a radius or voxel must be a finite number from 1e-18 to 1e18, not {0:e}")]
     InvalidRadius(f64),
+    /// A length that is set is zero, negative, infinite or not a number.
+    #[error("{name} must be a finite number above 0, not {length}")]
+    InvalidLength {
+        /// What was set.
+        name: &'static str,
+        /// To what.
+        length: f64,
+    },
     /// The lattice of a radius this small cannot be numbered at coordinates this large.
     #[error(
         "a radius or voxel of {radius:e} is too small for a coordinate of {coordinate:e}: float64 cannot tell its cells apart"

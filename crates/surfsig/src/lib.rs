@@ -50,6 +50,7 @@ mod members;
 mod moments;
 mod monitor;
 mod neighbor_distances;
+mod odometry;
 mod orientation;
 mod point_cloud;
 mod primitive;
@@ -65,6 +66,7 @@ mod status;
 mod surfaces;
 mod tensor;
 mod threads;
+mod visibility;
 mod voxels;
 
 pub use alignment::{
@@ -94,6 +96,10 @@ pub use kd_tree::KdTree;
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use monitor::Monitor;
 pub use neighbor_distances::mean_neighbor_distances;
+pub use odometry::{
+    ExpectationSettings, MapSettings, Odometry, OdometrySettings, PredictionSettings, RelocalisationSettings,
+    ScaleSettings, ScanAlignmentSettings, ScanPose, ScanStatus,
+};
 pub use orientation::consistent_directions;
 pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
@@ -106,4 +112,5 @@ pub use spacing::point_spacing;
 pub use status::Status;
 pub use surfaces::{FEWEST_SURFACE_POINTS, FoundSurface, FoundSurfaces, SurfaceOptions, find_surfaces};
 pub use threads::with_threads;
+pub use visibility::{RangeImageSettings, SphericalRangeImage, Visibility};
 pub use voxels::voxel_means;

@@ -1,4 +1,4 @@
-"""The way of a sensor through its scans: `estimate_odometry`."""
+"""The trajectory of a sensor, from its scans: `estimate_odometry`."""
 
 from surfsig.odometry.result import Odometry, ScanStatus
 from surfsig.odometry.search import estimate_odometry

@@ -17,7 +17,7 @@ class ScanStatus(enum.IntEnum):
     TRACKED = 0
     """Found next to where it was expected."""
     RELOCALISED = 1
-    """Found by its signatures, after tracking had failed."""
+    """Found by the signatures of its keypoints, after tracking had failed."""
     LOST = 2
     """Not found: no pose."""
     TOO_FEW_POINTS = 3
@@ -26,7 +26,7 @@ class ScanStatus(enum.IntEnum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Odometry:
-    """The way of a sensor: one struct of arrays, with a status for each of n scans.
+    """The trajectory of a sensor: one struct of arrays, with a status for each of n scans.
 
     The world is the frame of the first scan that has a pose. NaN stands where there is none.
     """
@@ -34,17 +34,18 @@ class Odometry:
     poses: Array
     """T_world_scan, (n, 4, 4)."""
     covariances: Array
-    """Of the small motion m (rotation vector in radians, then translation) in the scan's own frame by which a
-    pose is off, (n, 6, 6): T_true = T_world_scan exp(m). It grows as the map goes on from the first scan."""
+    """Of the twist m (rotation vector in radians, then translation) in the scan's own frame by which a pose
+    is off, (n, 6, 6): T_true = T_world_scan exp(m). It grows as the map goes on from the first scan."""
     status: NDArray[np.uint8]
     """`ScanStatus` as a number, (n,)."""
     overlaps: Array
-    """Share of the scan's places that lie on the map, (n,); 0 where there is no pose."""
+    """Share of the scan's points that lie on the map, (n,); 0 where there is no pose."""
     timestamps: Array
     """In seconds, (n,): from the recording, or the files' names where these are numbers; otherwise the scans'
     numbers."""
     voxel: float
-    """In which scans and map were thinned, in the scans' unit; NaN if no scan had enough points."""
+    """Edge of the voxels in which scans and map were thinned, in the scans' unit; NaN if no scan had enough
+    points."""
 
     def __len__(self) -> int:
         """Return the number of scans."""
@@ -68,6 +69,6 @@ class Odometry:
 
     @property
     def length(self) -> float:
-        """Length of the way, in the scans' unit: straight lines between the scans that have a pose."""
-        places = self.poses[np.isfinite(self.poses).all(axis=(1, 2)), :3, 3]
-        return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+        """Length of the trajectory, in the scans' unit: straight lines between the scans that have a pose."""
+        positions = self.poses[np.isfinite(self.poses).all(axis=(1, 2)), :3, 3]
+        return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())

@@ -1,4 +1,4 @@
-"""`estimate_odometry`: from scans to the way of their sensor."""
+"""`estimate_odometry`: from scans to the trajectory of their sensor."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from collections.abc import Callable, Iterable, Iterator, Sized
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
+from surfsig import _surfsig
 from surfsig.arguments import positive_length, thread_count
-from surfsig.convert.libraries import library
 from surfsig.errors import InvalidInputError
 from surfsig.files.sequence import ScanSequence, TimedScan, open_scan_sequence, scan_or_empty
+from surfsig.missing_returns import remove_missing_returns
 from surfsig.odometry.result import Odometry
 from surfsig.point_cloud import PointCloud
 
@@ -34,12 +36,12 @@ def estimate_odometry(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Odometry:
-    """Find the way of a sensor through its scans.
+    """Estimate the trajectory of a sensor from its scans.
 
-    Each scan is put onto a map of the places around that earlier scans have seen, from where the motion so
-    far lets it be expected. Where it does not lie there as well as scans usually do, it is searched among
-    scans that were kept (keyframes), by the signatures of its keypoints; what is found so counts only if the
-    scan alone is sure, or the next ones agree. Nothing needs to be set, and the result is always the same.
+    Each scan is aligned with a map of the surroundings that earlier scans have seen, from the pose to which
+    the last motion leads. Where it lies there worse than scans did of late, it is searched among keyframes by
+    the signatures of its keypoints; a pose that is found so counts only if the map explains all of the scan,
+    or the next scans follow it. Nothing needs to be set, and the result is always the same.
 
     Parameters
     ----------
@@ -47,16 +49,16 @@ def estimate_odometry(
         In the order of time: what `open_scan_sequence` gives or takes as one path (a folder, a ROS bag), or
         an iterable of clouds, `TimedScan` or files; they are read one by one. Each is in its sensor's frame,
         and taken from its viewpoint, where it has one, or from (0, 0, 0); where that is far from all points,
-        as in the coordinates of a map, the middle of the first scan stands for it.
+        as in the coordinates of a map, the median of the first scan stands for it.
     voxel
-        In which scans and map are thinned, in the scans' unit; by default such that the first scan fills
-        4,000.
+        Edge of the voxels in which scans and map are thinned, in the scans' unit; by default such that the
+        first scan fills 4,000.
     distance
-        To partners in the map, at most, in the scans' unit; by default three deviations of what was expected
-        before from what was found.
+        Largest distance between points that correspond, in the scans' unit; by default three root mean
+        squares of the errors of earlier predictions.
     map_range
-        Of the map about the sensor, in the scans' unit; by default 1.2 times the distance within which 99 in
-        100 points of a scan are.
+        Distance from the sensor up to which the map is kept, in the scans' unit; by default 1.2 times the
+        distance within which 99 in 100 points of a scan are.
     threads
         Number of threads; all cores by default. The result is the same.
     progress
@@ -72,7 +74,7 @@ def estimate_odometry(
     OSError
         If a file is missing.
     InvalidInputError
-        If an argument has no meaning, there are no scans, or small_gicp is not installed.
+        If an argument has no meaning, or there are no scans.
     FileFormatError
         If a bag cannot be opened.
 
@@ -82,32 +84,45 @@ def estimate_odometry(
         If a file cannot be read, which then counts as a scan without points, a bag ends too early, or missing
         returns at (0, 0, 0) are left out.
     """
-    edge, partners, around = (
-        None if value is None else positive_length(value, name)
-        for value, name in ((voxel, "voxel"), (distance, "distance"), (map_range, "map_range"))
-    )
-    workers = thread_count(threads) or os.cpu_count() or 1
-    # What needs it is imported where it is there only.
-    library("small_gicp", "small_gicp", "'surfsig[register]'")
-    from surfsig.odometry.way import Way
 
-    way = Way(edge, partners, around, workers)
+    def length(value: float | None, name: str) -> float | None:
+        return None if value is None else positive_length(value, name)
+
+    odometry = _surfsig.Odometry(
+        voxel=length(voxel, "voxel"),
+        max_correspondence_distance=length(distance, "distance"),
+        map_range=length(map_range, "map_range"),
+        threads=thread_count(threads),
+    )
     if isinstance(scans, (str, os.PathLike)):
         scans = open_scan_sequence(scans)
     total = len(scans) if isinstance(scans, Sized) else None
+    timestamps: list[float] = []
+    missing_returns = 0
     for number, scan in enumerate(_timed(scans)):
-        way.add(scan)
+        cloud = remove_missing_returns(scan.cloud)
+        missing_returns += len(scan.cloud) - len(cloud)
+        odometry.push(cloud.offsets, origin=cloud.origin.tolist(), viewpoint=_viewpoint(cloud))
+        timestamps.append(scan.timestamp)
         if progress is not None:
             progress(number + 1, number + 1 if total is None else total)
-    if not len(way):
+    if not timestamps:
         raise InvalidInputError("there are no scans")
-    if way.missing_returns:
+    if missing_returns:
         warnings.warn(
-            f"{way.missing_returns} points of {len(way)} scans are at (0, 0, 0), where a lidar's missing "
+            f"{missing_returns} points of {len(timestamps)} scans are at (0, 0, 0), where a lidar's missing "
             "returns are written; they are left out",
             stacklevel=2,
         )
-    return way.result()
+    return Odometry(
+        **odometry.arrays(),
+        timestamps=np.array(timestamps, np.float64),
+        voxel=np.nan if odometry.voxel is None else odometry.voxel,
+    )
+
+
+def _viewpoint(cloud: PointCloud) -> list[float] | None:
+    return None if cloud.viewpoint is None else cloud.viewpoint.tolist()
 
 
 def _timed(scans: Any) -> Iterator[TimedScan]:

@@ -119,6 +119,7 @@ fn no_function_of_the_header_fails_but_by_a_code() {
     fits::transforms(&mut called);
     poses::registration_options(&mut called);
     poses::registrations(&mut called);
+    poses::odometries(&mut called);
 
     let header = Path::new(env!("CARGO_MANIFEST_DIR")).join("include/surfsig.h");
     let text = std::fs::read_to_string(header).unwrap();

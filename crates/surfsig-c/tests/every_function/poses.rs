@@ -1,4 +1,4 @@
-//! Registration.
+//! Registration and odometry.
 
 use crate::*;
 use std::mem::MaybeUninit;
@@ -58,4 +58,44 @@ pub fn registrations(called: &mut Called) {
             }
         }
     }
+}
+
+pub fn odometries(called: &mut Called) {
+    assert!(call!(called, surfsig_scan_status_name(4)).is_null());
+    let mut made: *mut surfsig_odometry = null_mut();
+    let out = &raw mut made;
+    for length in [-1.0, f64::NAN, f64::INFINITY] {
+        call!(called, surfsig_odometry_new(length, 0.0, 0.0, 0, out) gives INVALID);
+        call!(called, surfsig_odometry_new(0.0, length, 0.0, 0, out) gives INVALID);
+        call!(called, surfsig_odometry_new(0.0, 0.0, length, 0, out) gives INVALID);
+        assert!(made.is_null());
+    }
+    call!(called, surfsig_odometry_new(0.0, 0.0, 0.0, 1025, out) gives INVALID);
+    call!(called, surfsig_odometry_new(0.0, 0.0, 0.0, 0, null_mut()) gives INVALID);
+    call!(called, surfsig_odometry_free(None));
+    assert_eq!(call!(called, surfsig_odometry_size(None)), 0);
+    assert!(call!(called, surfsig_odometry_voxel(None)).is_nan());
+    let mut room = MaybeUninit::<surfsig_scan_pose>::uninit();
+    let pose = room.as_mut_ptr();
+    call!(called, surfsig_odometry_pose(None, 0, pose) gives INVALID);
+    call!(called, surfsig_odometry_push(None, null(), pose) gives INVALID);
+    call!(called, surfsig_odometry_new(0.0, 0.0, 0.0, 1, out) gives OK);
+    let odometry = unsafe { made.as_mut() };
+    call!(called, surfsig_odometry_push(odometry, null(), pose) gives INVALID);
+    let clouds: Vec<Cloud> = odd_clouds().iter().map(|points| Cloud::of(points)).collect();
+    for cloud in &clouds {
+        let scan = surfsig_scan { cloud: cloud.0, viewpoint: null(), directions: null() };
+        let nowhere = surfsig_scan { viewpoint: BAD.as_ptr(), ..scan };
+        call!(called, surfsig_odometry_push(unsafe { made.as_mut() }, &nowhere, pose) gives INVALID);
+        call!(called, surfsig_odometry_push(unsafe { made.as_mut() }, &scan, null_mut()) gives OK);
+    }
+    let odometry = unsafe { made.as_ref() };
+    assert_eq!(call!(called, surfsig_odometry_size(odometry)), clouds.len());
+    call!(called, surfsig_odometry_pose(odometry, 0, null_mut()) gives INVALID);
+    call!(called, surfsig_odometry_pose(odometry, 0, pose) gives OK);
+    assert_eq!(unsafe { room.assume_init() }.status, surfsig_scan_status::TooFewPoints);
+    for index in [clouds.len(), usize::MAX] {
+        call!(called, surfsig_odometry_pose(odometry, index, pose) gives INVALID);
+    }
+    call!(called, surfsig_odometry_free(owned(made)));
 }

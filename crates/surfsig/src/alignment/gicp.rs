@@ -45,7 +45,10 @@ impl GicpCloud {
         let normals = points
             .par_iter()
             .with_min_len(PART)
-            .map_init(Vec::new, |found, &point| normal(&points, &tree, point, found))
+            .map_init(Vec::new, |found, &point| {
+                tree.nearest_k(point, NEIGHBORS, found);
+                plane_of(found.iter().map(|&(_, index)| points[index as usize])).normal
+            })
             .collect();
         Self { points, normals, tree }
     }
@@ -91,17 +94,55 @@ impl GicpCloud {
     }
 }
 
-/// The direction in which the nearest points extend least.
-fn normal(points: &[[f64; 3]], tree: &KdTree, at: [f64; 3], found: &mut Vec<(f64, u32)>) -> [f64; 3] {
-    tree.nearest_k(at, NEIGHBORS, found);
-    let offsets =
-        || found.iter().map(|&(_, index)| Vector3::from(points[index as usize]) - Vector3::from(at));
-    let count = found.len().max(1) as f64;
-    let mean = offsets().sum::<Vector3<f64>>() / count;
-    let covariance =
-        offsets().map(|offset| (offset - mean) * (offset - mean).transpose()).sum::<Matrix3<f64>>() / count;
-    let eigen = SymmetricEigen::new(covariance);
-    eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned().into()
+/// What [`gicp`] aligns with: points that are searched, with the normal of the surface around each.
+///
+/// A [`GicpCloud`] is one; a map to which points are added keeps its own.
+pub(crate) trait GicpTarget: Sync {
+    /// The number of the nearest point within a reach.
+    fn nearest(&self, at: [f64; 3], reach: f64) -> Option<u32>;
+    /// The point of a number, and its unit normal, of which the side is open; 0 where it is on no plane.
+    fn surface(&self, number: u32) -> ([f64; 3], [f64; 3]);
+}
+
+impl GicpTarget for GicpCloud {
+    fn nearest(&self, at: [f64; 3], reach: f64) -> Option<u32> {
+        self.tree.nearest(at, reach).map(|(number, _)| number)
+    }
+
+    fn surface(&self, number: u32) -> ([f64; 3], [f64; 3]) {
+        (self.points[number as usize], self.normals[number as usize])
+    }
+}
+
+/// The plane along which points extend.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Plane {
+    /// Unit normal, of which the side is open.
+    pub normal: [f64; 3],
+    /// Standard deviation along the normal over the smaller one within the plane: 0 of a plane, 1 of a ball or a line.
+    pub thickness: f64,
+}
+
+/// The plane of points, of which the first is the one that it is for.
+pub(crate) fn plane_of(points: impl Iterator<Item = [f64; 3]> + Clone) -> Plane {
+    let first = points.clone().next().map_or_else(Vector3::zeros, Vector3::from);
+    let (mut count, mut sum, mut products) = (0.0_f64, Vector3::zeros(), Matrix3::zeros());
+    // From the first point, where sums lose nothing at large coordinates.
+    for offset in points.map(|point| Vector3::from(point) - first) {
+        count += 1.0;
+        sum += offset;
+        products += offset * offset.transpose();
+    }
+    let mean = sum / count.max(1.0);
+    let eigen = SymmetricEigen::new(products / count.max(1.0) - mean * mean.transpose());
+    let least = eigen.eigenvalues.imin();
+    let within = eigen.eigenvalues.iter().enumerate().filter(|(k, _)| *k != least);
+    let smaller = within.fold(f64::INFINITY, |smaller, (_, value)| smaller.min(*value));
+    let thickness = (eigen.eigenvalues[least].max(0.0) / smaller).sqrt();
+    Plane {
+        normal: eigen.eigenvectors.column(least).into_owned().into(),
+        thickness: if smaller > 0.0 { thickness } else { 1.0 },
+    }
 }
 
 /// How [`gicp`] searches; lengths are in the unit of the points.
@@ -190,6 +231,16 @@ pub fn gicp(
     start: RigidTransform,
     settings: &GicpSettings,
 ) -> GicpResult {
+    gicp_with(target, source, start, settings)
+}
+
+/// [`gicp`] with any target.
+pub(crate) fn gicp_with(
+    target: &impl GicpTarget,
+    source: &GicpCloud,
+    start: RigidTransform,
+    settings: &GicpSettings,
+) -> GicpResult {
     let mut transform = start;
     let mut inliers = 0;
     let mut damping = DAMPING;
@@ -217,14 +268,13 @@ pub fn gicp(
 
 /// The nearest point of the target for each of the source, where there is one.
 fn correspondences(
-    target: &GicpCloud,
+    target: &impl GicpTarget,
     source: &GicpCloud,
     transform: &RigidTransform,
     reach: f64,
 ) -> Vec<Correspondence> {
     let correspondence = |(point, normal): (&[f64; 3], &[f64; 3])| {
-        let (index, _) = target.tree.nearest(transform.transform_point(*point), reach)?;
-        let (there, facing) = (target.points[index as usize], target.normals[index as usize]);
+        let (there, facing) = target.surface(target.nearest(transform.transform_point(*point), reach)?);
         // C_B + R C_A R^T of pieces of plane, whose covariances are 1 - (1 - flatness) n n^T.
         let mut joint = Matrix3::from_diagonal_element(2.0);
         for n in [Vector3::from(facing), transform.rotation * Vector3::from(*normal)] {

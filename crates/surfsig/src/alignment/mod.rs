@@ -18,6 +18,8 @@ pub use consensus::ConsensusSettings;
 pub(crate) use consensus::Correspondences;
 pub(crate) use even_sample::even_sample;
 pub use gicp::{GicpCloud, GicpResult, GicpSettings, gicp};
+pub(crate) use gicp::{GicpTarget, gicp_with, plane_of};
+pub(crate) use least_squares::solve_determined;
 pub use observability::{FreeDirection, free_directions};
 pub(crate) use point_to_plane::{FACING_AWAY, OrientedSurface, cosine_towards, transformed};
 pub use point_to_surface::PointToSurfaceSettings;

@@ -122,7 +122,7 @@ impl Climb<'_> {
                 goes_on
             });
             self.take_over(&balls, &numbers, &best);
-            self.settle(&ended);
+            self.finish(&ended);
             self.monitor.add(ended.len());
             if !lower.is_empty() {
                 self.from(first - 1, lower)?;
@@ -169,7 +169,7 @@ impl Climb<'_> {
     }
 
     /// Gives those queries that have ended and go back by a step the smaller ball.
-    fn settle(&mut self, ended: &[(usize, bool)]) {
+    fn finish(&mut self, ended: &[(usize, bool)]) {
         let Some((found, smaller)) = &mut self.found else { return };
         let back = ended.iter().filter(|(_, back)| *back).map(|&(query, _)| (query, query));
         found.take_over(back, smaller);

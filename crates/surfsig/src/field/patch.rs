@@ -61,7 +61,7 @@ impl Patch<'_> {
     }
 
     /// Makes the patches that wait into values.
-    fn settle<T>(
+    fn make_values<T>(
         &mut self,
         entries: &mut [Entry<T>],
         set: InstructionSet,
@@ -129,12 +129,12 @@ pub(super) fn patches<T: Send>(
                         entries.len(),
                     ));
                     if patch.pools.len() == TOGETHER {
-                        patch.settle(&mut entries, set, of_pools);
+                        patch.make_values(&mut entries, set, of_pools);
                     }
                 }
                 monitor.add(row.end - row.start);
             }
-            patch.settle(&mut entries, set, of_pools);
+            patch.make_values(&mut entries, set, of_pools);
             Ok(entries)
         })
         .collect::<Result<_, Error>>()?;

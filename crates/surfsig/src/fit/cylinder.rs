@@ -25,7 +25,7 @@ const MAX_STEPS: usize = 40;
 const TURN: f64 = 1e-4;
 
 /// A turn of the axis that counts as none.
-const SETTLED: f64 = 1e-10;
+const CONVERGED: f64 = 1e-10;
 
 /// A cylinder that was fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +42,7 @@ pub struct Cylinder {
 
 /// The cylinder with Taubin's normalisation: exact on points of a cylinder, and hardly biased by noise.
 ///
-/// The moments should be those about a place near the points, as for a sphere. `None` for fewer than 5 points, for points of a plane, and where no axis settles.
+/// The moments should be those about a place near the points, as for a sphere. `None` for fewer than 5 points, for points of a plane, and where no axis converges.
 ///
 /// ```
 /// use surfsig::{fit_cylinder, Moments};
@@ -105,7 +105,7 @@ fn along(pencil: &Pencil, axis: &Vector3<f64>) -> Option<Best> {
     }))
 }
 
-/// Newton's steps from an axis to that of a least mean square; `None` where they do not settle.
+/// Newton's steps from an axis to that of a least mean square; `None` where they do not converge.
 fn descend(pencil: &Pencil, start: Vector3<f64>) -> Option<(Vector3<f64>, Best)> {
     let mut axis = start;
     let mut best = along(pencil, &axis)?;
@@ -136,7 +136,7 @@ fn descend(pencil: &Pencil, start: Vector3<f64>) -> Option<(Vector3<f64>, Best)>
             _ if step.norm() < 1e-6 => return Some((axis, best)),
             _ => damping = (4.0 * damping).max(0.1),
         }
-        if step.norm() < SETTLED {
+        if step.norm() < CONVERGED {
             return Some((axis, best));
         }
     }

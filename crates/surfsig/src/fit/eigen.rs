@@ -14,7 +14,7 @@ const MAX_ITERATIONS: usize = 10;
 
 /// Change of the smallest eigenvalue, relative to it, that ends the iteration: the vector is then
 /// right to its root.
-const SETTLED: f64 = 1e-11;
+const CONVERGED: f64 = 1e-11;
 
 /// What rounding makes of an eigenvalue 0, in squares of the radius.
 const ROUNDING: f64 = 1e-17;
@@ -34,7 +34,7 @@ pub(super) struct Pencil<'a> {
 /// The smallest eigenvalue with its vector, and the next one.
 pub(super) struct Smallest {
     pub value: Lanes,
-    /// From above: settled only as far as `value` needed iterations, so the less the wider the gap is.
+    /// From above: converged only as far as `value` needed iterations, so the less the wider the gap is.
     pub next: Lanes,
     pub vector: Terms,
     /// The gradient's form times the vector.
@@ -191,7 +191,7 @@ impl<'a> Pencil<'a> {
             let (aa, bb) = (aa - shift, bb + shift);
             let swap = bb.lt(aa);
             let (of_a, of_b) = (swap.select(sine, cosine), swap.select(cosine, -sine));
-            // A lane that has settled keeps its answer, whatever its neighbours in the batch need.
+            // A lane that has converged keeps its answer, whatever its neighbours in the batch need.
             first = chosen_terms(active, &combined(of_a, &a, of_b, &b), &first);
             first_dual = chosen_terms(active, &combined(of_a, &a_dual, of_b, &b_dual), &first_dual);
             let (of_a, of_b) = (swap.select(cosine, sine), swap.select(-sine, cosine));
@@ -199,7 +199,7 @@ impl<'a> Pencil<'a> {
             let change = (value - aa.min(bb)).abs();
             value = active.select(aa.min(bb), value);
             next = active.select(aa.max(bb), next);
-            active = active & !change.le(value.mul_add(Lanes::splat(SETTLED), Lanes::splat(ROUNDING)));
+            active = active & !change.le(value.mul_add(Lanes::splat(CONVERGED), Lanes::splat(ROUNDING)));
         }
         Smallest {
             value: value.max(zero),

@@ -41,7 +41,7 @@ pub struct SurfacePoint {
 /// The quadric of a set of points with Taubin's normalisation.
 ///
 /// Exact on points that lie on a quadric. The moments should be those about a place near the points, as
-/// for a sphere. `None` for fewer than 9 points, and where nothing settles.
+/// for a sphere. `None` for fewer than 9 points, and where the iteration does not converge.
 ///
 /// ```
 /// use surfsig::{fit_quadric, Moments};
@@ -62,7 +62,7 @@ pub fn fit_quadric(moments: &Moments<f64>) -> Option<Quadric> {
     let task = Task { moments: &batch, axes: FitAxes::Surface, to_sensor: None, start: None };
     let fits = fit_quadrics(InstructionSet::detect(), &task);
     let fitted = fits.coefficients.map(|c| c.0[0]);
-    if !fits.settled.get(0) || !fitted.iter().all(|c| c.is_finite()) {
+    if !fits.solved.get(0) || !fitted.iter().all(|c| c.is_finite()) {
         return None;
     }
     let Placement { centre, unit } = placement;
@@ -111,7 +111,7 @@ impl Quadric {
         ]
     }
 
-    /// What the surface is where it is nearest to a place; `None` where the way there does not settle, as
+    /// What the surface is where it is nearest to a place; `None` where the steps towards it do not converge, as
     /// from a sphere's centre.
     ///
     /// ```
@@ -168,7 +168,7 @@ mod tests {
             let moved = Moments::<f64>::of_points(&turned(&points, &rotation)).shifted(place).scaled(unit);
             let found = fit_quadric(&moved).unwrap();
             prop_assert!((found.residual / unit - expected.residual).abs() < 1e-6 * expected.residual);
-            // Where the gap is wide, the iteration ends before the next eigenvalue has settled.
+            // Where the gap is wide, the iteration ends before the next eigenvalue has converged.
             prop_assert!((found.gap / expected.gap).ln().abs() < 0.5, "{} {}", found.gap, expected.gap);
             prop_assert!((found.extent / unit - expected.extent).abs() < 1e-9);
             let [from, to] = [[0.0, 0.0, 0.1], (rotation * Vector3::new(0.0, 0.0, 0.1) + Vector3::from(place)).into()];

@@ -49,7 +49,7 @@ pub(crate) struct Quadrics {
     /// Standard errors of k1, k2 and the mean curvature, from the residual and the points' arrangement.
     pub errors: [Lanes; 3],
     /// Enough points, and an eigenvector that no longer changes.
-    pub settled: Mask,
+    pub solved: Mask,
     /// Settled, and with a foot inside the ball.
     #[cfg_attr(not(test), expect(dead_code, reason = "what the tests ask where nothing is trusted"))]
     pub converged: Mask,
@@ -84,8 +84,8 @@ fn fit(task: &Task<'_>) -> Quadrics {
     let principal = local.principal(away_from_sensor);
     let in_ball = dot(&local.foot, &local.foot).le(Lanes::ONE);
     let unknowns = Lanes::splat(UNKNOWNS as f64);
-    let settled = smallest.converged & unknowns.le(moments.count);
-    let converged = settled & local.on_surface & in_ball;
+    let solved = smallest.converged & unknowns.le(moments.count);
+    let converged = solved & local.on_surface & in_ball;
     let left_over = ((moments.count - unknowns) / moments.count).max(Lanes::ZERO);
     let gap = left_over * left_over * smallest.next / (smallest.value + Lanes::splat(FLOOR));
     let trusted = converged & Lanes::splat(TRUSTED_GAP).le(gap);
@@ -101,7 +101,7 @@ fn fit(task: &Task<'_>) -> Quadrics {
         coefficients: [constant, x, y, z, xx, xy, xz, yy, yz, zz],
         residual: smallest.value.sqrt(),
         gap,
-        settled,
+        solved,
         converged,
         errors,
         trusted,

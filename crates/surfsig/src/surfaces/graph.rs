@@ -41,7 +41,7 @@ impl BallVisitor for Nearest {
 }
 
 impl Graph {
-    /// Of points within a radius that holds enough for most. A point with a stride has every so manieth of its nearest
+    /// Of points within a radius that holds enough for most. A point with a stride has every n-th of its nearest
     /// points for neighbours.
     pub fn new(
         positions: &[[f64; 3]],

@@ -23,13 +23,13 @@ const NEAR: f64 = 3.0;
 /// of a scan may err together.
 const ROUGHEST: f64 = 1.15;
 
-/// A surface whose points stray more, in the same units, is none.
+/// A surface whose points deviate more, in the same units, is rejected.
 const ROUGH: f64 = 1.4;
 
 /// A surface with less than this part of the fewest points does not become large by bending.
 const SMALL: usize = 4;
 
-/// A surface with so many points that strays more than noise does is not the right one, and need not grow further.
+/// A surface of so many points that deviate by more than noise is not the right one, and need not grow further.
 const LARGE: usize = 2000;
 
 /// Extent of a curved surface in units of its radius.
@@ -44,7 +44,7 @@ const LOOKED_AT: usize = 100;
 const LINE: f64 = 0.01;
 
 /// Rounds after the growth has ended.
-const MAX_SETTLING: usize = 6;
+const MAX_STABLE_ROUNDS: usize = 6;
 
 /// Rounds of growing and fitting.
 const MAX_ROUNDS: usize = 30;
@@ -52,7 +52,7 @@ const MAX_ROUNDS: usize = 30;
 /// A surface of a kind with more parameters must gain this share of points, ...
 const MORE: f64 = 1.15;
 
-/// ... or explain those that there are so much better: of the mean square there is no more left.
+/// ... or leave at most this share of the mean squared distance of the points that there are.
 const BETTER: f64 = 0.8;
 
 /// Of several kinds the simplest is taken whose standard deviation is at most so many times the least.
@@ -173,7 +173,7 @@ impl Grower<'_> {
     fn grow(&mut self, start: Primitive, from: &[u32], noise: f64) -> Option<Region> {
         let scene = self.scene;
         let mut region = Region { primitive: start, members: from.to_vec(), deviation: 0.0, noise };
-        let mut settled = 0;
+        let mut stable_rounds = 0;
         for _ in 0..MAX_ROUNDS {
             let before = region.members.len();
             region.fit(scene, SAMPLE)?;
@@ -189,9 +189,9 @@ impl Grower<'_> {
             if after < FEW {
                 return None;
             }
-            settled += usize::from(after < most);
+            stable_rounds += usize::from(after < most);
             if after >= self.enough
-                || settled >= MAX_SETTLING
+                || stable_rounds >= MAX_STABLE_ROUNDS
                 || after < most && after.abs_diff(before) <= after / 300
             {
                 break;
@@ -291,7 +291,7 @@ impl Region {
         2 * self.members.iter().step_by(step).filter(on_line).count() > looked_at
     }
 
-    /// Whether its points stray no more than noise does.
+    /// Whether its points deviate by no more than noise.
     pub fn is_smooth(&self, scene: &Scene) -> bool {
         self.deviation <= ROUGH * self.noise + scene.floor
     }

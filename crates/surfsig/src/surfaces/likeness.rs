@@ -27,9 +27,10 @@ const ALIKE: f64 = 2.0;
 
 /// Rounds, and the ratio at which they end.
 const ROUNDS: usize = 5;
-const SETTLED: f64 = 1.08;
+const CONVERGED: f64 = 1.08;
 
-/// What surfaces' points stray by, in units of what the nearest points show, and how many points err as one.
+/// How far points lie from their surface, in units of the noise that their nearest points show; and how many points
+/// have one error in common.
 #[derive(Clone, Copy)]
 pub(super) struct Likeness {
     pub spread: f64,
@@ -41,8 +42,8 @@ impl Likeness {
     pub const NONE: Self = Self { spread: 1.0, alike: 1.0 };
 }
 
-/// Looks how far surfaces stray that may stray as far as the last ones did, until that does not grow any more. Says
-/// whether there was anything to learn from.
+/// Measures how far points lie from surfaces that are grown on trial, with the tolerance that the last round measured,
+/// until it does not rise any more. Tells whether there was anything to learn from.
 pub(super) fn learn(
     scene: &mut Scene,
     seeds: &[u32],
@@ -51,27 +52,27 @@ pub(super) fn learn(
     let (first, last) = ((SMOOTHEST * seeds.len() as f64) as usize, (ROUGHEST * seeds.len() as f64) as usize);
     let step = ((last - first) / TRIALS).max(1);
     for round in 0..ROUNDS {
-        let mut strays = Vec::new();
+        let mut deviations = Vec::new();
         let mut alike = Vec::new();
         for &seed in seeds[first..last].iter().step_by(step) {
             let Some(region) = grower(scene, seed, ENOUGH) else { continue };
             if region.members.len() >= LEAST && !scene.is_noiseless(region.noise) {
-                strays.push(region.deviation / region.noise);
+                deviations.push(region.deviation / region.noise);
                 alike.push(points_as_one(scene, &region));
             }
         }
-        if strays.len() < FEWEST {
+        if deviations.len() < FEWEST {
             return round > 0;
         }
-        let (stray, alike) = (middle(strays).unwrap_or(1.0), middle(alike).unwrap_or(1.0));
+        let (deviation, alike) = (middle(deviations).unwrap_or(1.0), middle(alike).unwrap_or(1.0));
         if alike < ALIKE {
             return true;
         }
         scene.likeness.alike = alike;
-        if stray < SETTLED {
+        if deviation < CONVERGED {
             return true;
         }
-        scene.likeness.spread *= stray;
+        scene.likeness.spread *= deviation;
     }
     true
 }

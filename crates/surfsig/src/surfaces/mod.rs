@@ -1,13 +1,13 @@
 //! Which parts of a scan are planes, spheres, cylinders, cones and tori.
 //!
-//! [`scene`] knows each point's neighbours, normal and noise; [`growth`] lets a [`crate::Primitive`] grow, [`settling`]
+//! [`scene`] knows each point's neighbours, normal and noise; [`growth`] lets a [`crate::Primitive`] grow, [`merging`]
 //! joins what is one and shares out what lies between.
 
 mod graph;
 mod growth;
 mod likeness;
+mod merging;
 mod scene;
-mod settling;
 
 use crate::primitive::{SurfaceKind, Vector, uncertainty};
 use crate::{Error, Monitor, PointCloud, with_threads};
@@ -122,8 +122,8 @@ pub fn find_surfaces(
         let wanted = |kind: &SurfaceKind| options.kinds.is_empty() || options.kinds.contains(kind);
         let kinds: Vec<SurfaceKind> = SurfaceKind::ALL.into_iter().filter(wanted).collect();
         let mut regions = regions(&mut scene, &kinds, fewest, monitor)?;
-        settling::merge(&mut scene, &mut regions);
-        settling::assign(&mut scene, &mut regions);
+        merging::merge(&mut scene, &mut regions);
+        merging::assign(&mut scene, &mut regions);
         // Some may have lost their points to a nearer one.
         regions.retain(|region| region.members.len() >= fewest);
         Ok(assembled(cloud.len(), &scene, &kinds, regions))

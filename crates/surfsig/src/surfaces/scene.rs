@@ -31,7 +31,7 @@ const QUARTER: f64 = 1.15;
 /// Standard deviation of points that fill a ball instead of a surface in it, in units of its radius, and more.
 const THICK: f64 = 0.32;
 
-/// Noise in units of the usual one from which a place is on a step of the sensor's depth, ...
+/// Noise in units of the typical noise below which a point lies on one step of a sensor that measures depth in steps, ...
 const STEP: f64 = 0.1;
 
 /// ... and so many times as many points are looked at.
@@ -118,8 +118,8 @@ impl Scene {
         Ok(Some(scene))
     }
 
-    /// Looks at so many nearest points of those that have no label: of every so manieth, for neighbours have most of them
-    /// in common. The others' noise is not known any more.
+    /// Estimates noise anew, from so many nearest points, for points without a label: for one in every few of them, since
+    /// neighbours have most of their nearest points in common. The noise of the others counts as unknown.
     pub fn look_farther(&mut self, neighbours: usize, monitor: &Monitor) -> Result<(), Error> {
         let left: Vec<u32> =
             self.chosen.iter().copied().filter(|&point| self.labels[point as usize] == NONE).collect();
@@ -129,13 +129,13 @@ impl Scene {
         self.look_around(&some, neighbours, monitor)
     }
 
-    /// Looks at more points around those that lie on a surface much smoother than what is usual: they are on one step
-    /// of a sensor that measures in steps.
+    /// Estimates noise from more neighbours for points whose own noise is far below the typical one: they lie on one step
+    /// of a sensor that measures depth in steps.
     fn look_across_steps(&mut self, monitor: &Monitor) -> Result<(), Error> {
         let known = self.noise.iter().copied().filter(|noise| noise.is_finite()).collect();
         match middle(known) {
-            Some(usual) if !self.is_noiseless(usual) => {
-                let smooth = |&point: &u32| self.noise[point as usize] < STEP * usual;
+            Some(typical) if !self.is_noiseless(typical) => {
+                let smooth = |&point: &u32| self.noise[point as usize] < STEP * typical;
                 let smooth: Vec<u32> = self.chosen.iter().copied().filter(smooth).collect();
                 self.look_around(&smooth, FARTHER * LOCAL, monitor)
             }

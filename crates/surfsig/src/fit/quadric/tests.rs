@@ -40,7 +40,7 @@ fn bits(fits: &Quadrics, lane: usize) -> Vec<u64> {
         residual,
         gap,
         errors,
-        settled,
+        solved,
         converged,
         trusted,
         preferred,
@@ -50,7 +50,7 @@ fn bits(fits: &Quadrics, lane: usize) -> Vec<u64> {
     let numbers = vectors.iter().flatten().chain(coefficients).chain(&scalars);
     numbers
         .map(|v| v.0[lane].to_bits())
-        .chain([settled, converged, trusted, preferred].map(|m| m.get(lane).into()))
+        .chain([solved, converged, trusted, preferred].map(|m| m.get(lane).into()))
         .collect()
 }
 
@@ -97,7 +97,7 @@ proptest! {
         if fits.gap.0[0] > 4.0 {
             let value = fits.residual.0[0].powi(2);
             prop_assert!((value - best.mean_square).abs() < 1e-9 * best.mean_square + 1e-16);
-            prop_assert!(fits.settled.get(0));
+            prop_assert!(fits.solved.get(0));
             let found = fits.coefficients.map(|c| c.0[0]);
             let sign: f64 = found.iter().zip(best.coefficients).map(|(a, b)| a * b).sum::<f64>().signum();
             for (found, expected) in found.iter().zip(best.coefficients) {

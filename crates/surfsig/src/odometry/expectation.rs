@@ -1,0 +1,126 @@
+//! How scans lie on the map of late, by which a pose is doubted, believed at once, or on trial.
+
+use super::scan_alignment::ScanAlignment;
+use super::settings::ExpectationSettings;
+use crate::scan::median;
+use std::collections::VecDeque;
+
+/// What the last scans with a pose did; all shares depend on the sensor and its surroundings.
+#[derive(Debug, Clone)]
+pub(super) struct Expectation {
+    settings: ExpectationSettings,
+    overlaps: VecDeque<f64>,
+    free_space: VecDeque<f64>,
+    unexplained: VecDeque<f64>,
+}
+
+impl Expectation {
+    pub fn new(settings: &ExpectationSettings) -> Self {
+        let none = VecDeque::new;
+        Self { settings: settings.clone(), overlaps: none(), free_space: none(), unexplained: none() }
+    }
+
+    /// Takes a scan that has a pose.
+    pub fn add(&mut self, found: &ScanAlignment) {
+        let values = [found.overlap, found.free_space, found.unexplained];
+        for (last, value) in
+            [&mut self.overlaps, &mut self.free_space, &mut self.unexplained].into_iter().zip(values)
+        {
+            last.push_back(value);
+            if last.len() > self.settings.scans {
+                last.pop_front();
+            }
+        }
+    }
+
+    /// Whether the pose is observable, and the scan lies on the map as scans do and contradicts nothing.
+    pub fn is_met(&self, found: &ScanAlignment) -> bool {
+        let enough = found.overlap >= self.settings.doubted_overlap * self.overlap();
+        found.observable && enough && !self.is_contradicted(found)
+    }
+
+    /// Whether scan and map cannot both be, by what either sensor would have measured.
+    pub fn is_contradicted(&self, found: &ScanAlignment) -> bool {
+        found.unexplained > self.largest_unexplained() + self.settings.unexplained_excess
+            || found.free_space > self.free_space() + self.settings.free_space_excess
+    }
+
+    /// Whether a scan alone says that its pose is right: the map explains all of it.
+    pub fn is_certain(&self, found: &ScanAlignment) -> bool {
+        let full = found.overlap >= self.settings.certain_overlap * self.overlap();
+        let explained = found.unexplained <= self.settings.certain_unexplained;
+        found.observable && full && explained && !self.is_contradicted(found)
+    }
+
+    /// Whether a new room, or something that moves, may be all that is unexpected.
+    pub fn may_be_new(&self, found: &ScanAlignment) -> bool {
+        let departed = found.free_space <= self.free_space() + self.settings.departed_excess;
+        let arrived = found.unexplained <= self.largest_unexplained() + self.settings.arrived_excess;
+        found.observable && departed && arrived
+    }
+
+    fn overlap(&self) -> f64 {
+        median(self.overlaps.iter().copied().collect()).unwrap_or(self.settings.first_overlap)
+    }
+
+    fn free_space(&self) -> f64 {
+        median(self.free_space.iter().copied().collect()).unwrap_or(0.0)
+    }
+
+    /// Before any scan is known, all of one may be new.
+    fn largest_unexplained(&self) -> f64 {
+        self.unexplained.iter().copied().reduce(f64::max).unwrap_or(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::RigidTransform;
+    use nalgebra::Matrix6;
+
+    fn lying(overlap: f64, free_space: f64, unexplained: f64) -> ScanAlignment {
+        ScanAlignment {
+            T_map_scan: RigidTransform::identity(),
+            covariance: Matrix6::identity(),
+            overlap,
+            free_space,
+            unexplained,
+            observable: true,
+            scans: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn the_last_scans_say_what_is_expected() {
+        let mut expectation = Expectation::new(&ExpectationSettings::default());
+        // Before any scan only overlap and free space say something.
+        assert!(expectation.is_met(&lying(0.4, 0.0, 0.9)));
+        assert!(!expectation.is_met(&lying(0.3, 0.0, 0.0)));
+        for unexplained in [0.0, 0.03, 0.01] {
+            expectation.add(&lying(0.8, 0.02, unexplained));
+        }
+        assert!(expectation.is_met(&lying(0.69, 0.029, 0.044)));
+        assert!(!expectation.is_met(&lying(0.67, 0.0, 0.0)));
+        assert!(!expectation.is_met(&lying(0.8, 0.031, 0.0)));
+        assert!(!expectation.is_met(&lying(0.8, 0.0, 0.046)));
+        assert!(!expectation.is_met(&ScanAlignment { observable: false, ..lying(0.8, 0.0, 0.0) }));
+        assert!(expectation.is_certain(&lying(0.75, 0.0, 0.019)));
+        assert!(!expectation.is_certain(&lying(0.74, 0.0, 0.0)));
+        assert!(!expectation.is_certain(&lying(0.8, 0.0, 0.021)));
+        assert!(expectation.may_be_new(&lying(0.5, 0.06, 0.22)));
+        assert!(!expectation.may_be_new(&lying(0.5, 0.0, 0.24)));
+        assert!(!expectation.may_be_new(&lying(0.5, 0.08, 0.0)));
+    }
+
+    #[test]
+    fn scans_of_long_ago_are_forgotten() {
+        let mut expectation = Expectation::new(&ExpectationSettings::default());
+        expectation.add(&lying(0.9, 0.0, 0.5));
+        for _ in 0..10 {
+            expectation.add(&lying(0.5, 0.0, 0.0));
+        }
+        assert!(expectation.is_met(&lying(0.43, 0.0, 0.0)));
+        assert!(!expectation.is_met(&lying(0.5, 0.0, 0.1)));
+    }
+}

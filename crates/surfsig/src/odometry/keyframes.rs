@@ -1,0 +1,148 @@
+//! Scans that are kept, to find a sensor again that was lost.
+
+use super::local_map::LocalMap;
+use super::scan_alignment::{ScanAlignment, align};
+use super::settings::OdometrySettings;
+use super::thinned_scan::ThinnedScan;
+use super::tracker::rotation_angle;
+use super::voxel_index::squared_distance;
+use crate::alignment::{ConsensusSettings, Correspondences};
+use crate::field::{KeypointOptions, keypoints_within, match_fields};
+use crate::visibility::SphericalRangeImage;
+use crate::{FieldOptions, FieldPlaces, Monitor, PointCloud, Radius, RigidTransform};
+
+/// A scan that is kept; lengths are in voxels.
+#[allow(non_snake_case)]
+struct Keyframe {
+    number: u32,
+    T_map_scan: RigidTransform,
+    /// The mean of each voxel's points.
+    points: Vec<[f32; 3]>,
+    /// Those of smaller voxels, for the signatures.
+    detail: Vec<[f32; 3]>,
+    range_image: SphericalRangeImage,
+    /// Its keypoints, once they have been asked for.
+    described: Option<FieldPlaces>,
+}
+
+/// The keyframes of a sequence, one for each viewpoint and direction.
+pub(super) struct Keyframes {
+    settings: OdometrySettings,
+    median_range: f64,
+    patch_radius: f64,
+    kept: Vec<Keyframe>,
+}
+
+impl Keyframes {
+    pub fn new(settings: &OdometrySettings, median_range: f64, patch_radius: f64) -> Self {
+        Self { settings: settings.clone(), median_range, patch_radius, kept: Vec::new() }
+    }
+
+    /// Keeps a scan, unless there is one of nearly the same pose.
+    pub fn offer(&mut self, scan: &ThinnedScan, pose: &RigidTransform, number: u32) {
+        let settings = &self.settings.relocalisation;
+        let to_scan = pose.inverse();
+        let is_alike = |other: &Keyframe| {
+            let between = to_scan * other.T_map_scan;
+            between.translation.norm() < settings.keyframe_distance * self.median_range
+                && rotation_angle(&between) < settings.keyframe_rotation
+        };
+        if self.kept.iter().rev().any(is_alike) {
+            return;
+        }
+        self.kept.push(Keyframe {
+            number,
+            T_map_scan: *pose,
+            points: in_float32(&scan.points),
+            detail: in_float32(&scan.means(settings.detail_voxel)),
+            range_image: scan.range_image.clone(),
+            described: None,
+        });
+    }
+
+    /// Tells which points of a scan at a pose the keyframes next to it would have measured.
+    pub fn would_have_seen(&self, pose: &RigidTransform) -> impl Fn([f64; 3]) -> bool + use<'_> {
+        let distance = |other: &Keyframe| (other.T_map_scan.translation - pose.translation).norm();
+        let mut near: Vec<&Keyframe> = self.kept.iter().collect();
+        near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        near.truncate(self.settings.relocalisation.observers);
+        let observers: Vec<(RigidTransform, &SphericalRangeImage)> =
+            near.iter().map(|other| (other.T_map_scan.inverse() * *pose, &other.range_image)).collect();
+        move |point| {
+            observers
+                .iter()
+                .any(|(transform, image)| image.visibility(transform.transform_point(point)).is_in_sight())
+        }
+    }
+
+    /// Of the poses that matches propose, the one that lies best on the map of the keyframes around it, and that map.
+    pub fn find(
+        &mut self,
+        scan: &ThinnedScan,
+        map_range: f64,
+        is_believed: impl Fn(&ScanAlignment) -> bool,
+    ) -> Option<(ScanAlignment, LocalMap)> {
+        let mut best: Option<(ScanAlignment, LocalMap)> = None;
+        let distance = self.settings.relocalisation.max_correspondence_distance;
+        for pose in self.proposals(scan) {
+            let map = self.submap(pose.translation.into(), map_range);
+            let known = |pose: &RigidTransform| self.would_have_seen(pose);
+            let Some(found) = align(scan, &map, pose, distance, &self.settings.alignment, known) else {
+                continue;
+            };
+            let is_better = best.as_ref().is_none_or(|(other, _)| found.overlap > other.overlap);
+            if is_better && is_believed(&found) {
+                best = Some((found, map));
+            }
+        }
+        best
+    }
+
+    /// Poses of a scan that enough matches with a keyframe agree with, those of most matches first.
+    fn proposals(&mut self, scan: &ThinnedScan) -> Vec<RigidTransform> {
+        let radius = self.patch_radius;
+        let settings = &self.settings.relocalisation;
+        let consensus = ConsensusSettings::default();
+        let ours = described(&in_float32(&scan.means(settings.detail_voxel)), radius);
+        let mut proposals: Vec<(usize, RigidTransform)> = Vec::new();
+        for keyframe in self.kept.iter_mut().rev().take(settings.max_keyframes) {
+            let theirs = keyframe.described.get_or_insert_with(|| described(&keyframe.detail, radius));
+            let matches = Correspondences::new(&match_fields(&ours, theirs, true), &ours, theirs, consensus);
+            let transform = matches.agreed_transform();
+            let agree = matches.inlier_count(&transform);
+            if agree >= settings.min_matches {
+                proposals.push((agree, keyframe.T_map_scan * transform));
+            }
+        }
+        proposals.sort_by_key(|(agree, _)| std::cmp::Reverse(*agree));
+        proposals.into_iter().take(settings.max_trials).map(|(_, pose)| pose).collect()
+    }
+
+    /// The map of the keyframes taken within a distance of a point.
+    fn submap(&self, center: [f64; 3], distance: f64) -> LocalMap {
+        let mut map = LocalMap::new(&self.settings.map);
+        for keyframe in &self.kept {
+            let from: [f64; 3] = keyframe.T_map_scan.translation.into();
+            if squared_distance(&from, &center) <= distance * distance {
+                let moved = |point: &[f32; 3]| keyframe.T_map_scan.transform_point(point.map(f64::from));
+                map.add(keyframe.points.iter().map(moved), keyframe.number);
+            }
+        }
+        map.keep_within(center, distance);
+        map
+    }
+}
+
+/// The keypoints of a scan about its sensor; none where it has no patch.
+fn described(points: &[[f32; 3]], radius: f64) -> FieldPlaces {
+    let options = FieldOptions { viewpoint: Some([0.0; 3]), ..Default::default() };
+    let found = Radius::new(radius).and_then(|radius| {
+        let (cloud, monitor) = (PointCloud::new(points), Monitor::default());
+        keypoints_within(&cloud, radius, &KeypointOptions::default(), &options, &monitor)
+    });
+    found.unwrap_or_else(|_| FieldPlaces::new(radius))
+}
+
+fn in_float32(points: &[[f64; 3]]) -> Vec<[f32; 3]> {
+    points.iter().map(|point| point.map(|c| c as f32)).collect()
+}

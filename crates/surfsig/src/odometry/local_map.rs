@@ -1,0 +1,245 @@
+//! The sensor's surroundings, as earlier scans have seen them; lengths are in voxels.
+
+use super::settings::MapSettings;
+use super::voxel_index::{Nearest, VoxelIndex, squared_distance};
+use crate::alignment::{GicpTarget, plane_of};
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+/// Distance up to which a point's neighbourhood counts as dense: those that change one are then found in the blocks
+/// next to them.
+const DENSE: f64 = 4.0;
+/// Edge of the cells that sparse points are sorted into: as far as any neighbourhood reaches.
+const CELL: f64 = 16.0;
+
+/// One point for each voxel, the first that was seen, with the normal of the surface there.
+///
+/// A mean over scans would move with the errors of their poses; the first point stays where it is. When points come in,
+/// normals are made anew only where the nearest neighbours are other ones than before.
+#[derive(Debug, Clone)]
+pub(super) struct LocalMap {
+    neighbors: usize,
+    max_thickness: f64,
+    points: Vec<[f64; 3]>,
+    /// Unit normals; 0 where neighbours are on no plane, as at edges and in thickets.
+    normals: Vec<[f64; 3]>,
+    /// Number of the scan that each point came from.
+    scans: Vec<u32>,
+    /// Squared distance to the farthest neighbour that the normal was taken from; infinite where these were too few.
+    reaches: Vec<f64>,
+    index: VoxelIndex,
+    /// Points whose neighbours are not within `DENSE`, by cells.
+    sparse: FxHashMap<[i32; 3], Vec<u32>>,
+}
+
+impl LocalMap {
+    pub fn new(settings: &MapSettings) -> Self {
+        Self {
+            neighbors: settings.normal_neighbors,
+            max_thickness: settings.max_thickness,
+            points: Vec::new(),
+            normals: Vec::new(),
+            scans: Vec::new(),
+            reaches: Vec::new(),
+            index: VoxelIndex::default(),
+            sparse: FxHashMap::default(),
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    pub fn points(&self) -> &[[f64; 3]] {
+        &self.points
+    }
+
+    /// The unit normal of a point, of which the side is open; `None` where its neighbours are on no plane.
+    pub fn normal(&self, number: u32) -> Option<[f64; 3]> {
+        Some(self.normals[number as usize]).filter(|normal| *normal != [0.0; 3])
+    }
+
+    pub fn scans(&self) -> &[u32] {
+        &self.scans
+    }
+
+    /// The nearest point within a reach.
+    pub fn nearest(&self, at: [f64; 3], reach: f64) -> Nearest {
+        self.index.nearest(&self.points, at, reach)
+    }
+
+    /// Adds those points of a scan that are in voxels of their own.
+    pub fn add(&mut self, points: impl IntoIterator<Item = [f64; 3]>, scan: u32) {
+        let before = self.points.len();
+        for point in points {
+            if self.index.insert(point, self.points.len() as u32) {
+                self.points.push(point);
+                self.scans.push(scan);
+            }
+        }
+        self.normals.resize(self.points.len(), [0.0; 3]);
+        self.reaches.resize(self.points.len(), f64::INFINITY);
+        self.renew_normals(before);
+    }
+
+    /// Makes the normals of points from a number on, and of all whose neighbours they have become.
+    fn renew_normals(&mut self, first_new: usize) {
+        let mut changed = vec![false; self.points.len()];
+        changed[first_new..].fill(true);
+        for new in &self.points[first_new..] {
+            let mut mark = |number: u32| {
+                let other = number as usize;
+                changed[other] |= squared_distance(&self.points[other], new) <= self.reaches[other];
+            };
+            self.index.visit(*new, DENSE, &mut mark);
+            let [x, y, z] = cell_of(new);
+            for neighbor in 0..27 {
+                let cell = [x + neighbor % 3 - 1, y + neighbor / 3 % 3 - 1, z + neighbor / 9 - 1];
+                self.sparse.get(&cell).into_iter().flatten().copied().for_each(&mut mark);
+            }
+        }
+        let numbers: Vec<u32> =
+            (0..).zip(&changed).filter_map(|(number, changed)| changed.then_some(number)).collect();
+        let made: Vec<([f64; 3], f64)> = numbers
+            .par_iter()
+            .with_min_len(64)
+            .map_init(Vec::new, |found, number| {
+                self.index.nearest_k(&self.points, self.points[*number as usize], self.neighbors, found);
+                let reach =
+                    if found.len() < self.neighbors { f64::INFINITY } else { found[found.len() - 1].0 };
+                let plane = plane_of(found.iter().map(|(_, index)| self.points[*index as usize]));
+                let is_thin = plane.thickness <= self.max_thickness;
+                (if is_thin { plane.normal } else { [0.0; 3] }, reach)
+            })
+            .collect();
+        for (number, (normal, reach)) in numbers.into_iter().zip(made) {
+            let (index, is_new) = (number as usize, number as usize >= first_new);
+            let was_sparse = !is_new && self.reaches[index] > DENSE * DENSE;
+            if reach > DENSE * DENSE && !was_sparse {
+                self.sparse.entry(cell_of(&self.points[index])).or_default().push(number);
+            }
+            (self.normals[index], self.reaches[index]) = (normal, reach);
+        }
+        let reaches = &self.reaches;
+        self.sparse.retain(|_, numbers| {
+            numbers.retain(|number| reaches[*number as usize] > DENSE * DENSE);
+            !numbers.is_empty()
+        });
+    }
+
+    /// Takes out what is farther from a point. Far points are sparse, so their normals are poor.
+    pub fn keep_within(&mut self, center: [f64; 3], distance: f64) {
+        let is_near = |point: &[f64; 3]| squared_distance(point, &center) <= distance * distance;
+        let near: Vec<bool> = self.points.iter().map(is_near).collect();
+        if near.iter().all(|near| *near) {
+            return;
+        }
+        keep(&mut self.points, &near);
+        keep(&mut self.normals, &near);
+        keep(&mut self.scans, &near);
+        keep(&mut self.reaches, &near);
+        self.index = VoxelIndex::default();
+        self.sparse.clear();
+        for (number, (point, reach)) in (0..).zip(self.points.iter().zip(&self.reaches)) {
+            self.index.insert(*point, number);
+            if *reach > DENSE * DENSE {
+                self.sparse.entry(cell_of(point)).or_default().push(number);
+            }
+        }
+    }
+}
+
+impl GicpTarget for LocalMap {
+    fn nearest(&self, at: [f64; 3], reach: f64) -> Option<u32> {
+        let found = self.nearest(at, reach);
+        found.is_some().then_some(found.index)
+    }
+
+    fn surface(&self, number: u32) -> ([f64; 3], [f64; 3]) {
+        (self.points[number as usize], self.normals[number as usize])
+    }
+}
+
+fn cell_of(point: &[f64; 3]) -> [i32; 3] {
+    // One less than the whole range of numbers, as the cells next to it are looked at.
+    point.map(|c| ((c / CELL).floor() as i32).clamp(i32::MIN + 1, i32::MAX - 1))
+}
+
+fn keep<T: Copy>(values: &mut Vec<T>, kept: &[bool]) {
+    let mut flags = kept.iter();
+    values.retain(|_| flags.next() == Some(&true));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::KdTree;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    fn map_of(scans: &[Vec<[f64; 3]>]) -> LocalMap {
+        let mut map = LocalMap::new(&MapSettings::default());
+        for (number, points) in (0..).zip(scans) {
+            map.add(points.iter().copied(), number);
+        }
+        map
+    }
+
+    /// The largest difference between normals of a map and those that are made of all its points at once.
+    fn largest_error_of_normals(map: &LocalMap) -> f64 {
+        let tree = KdTree::new(map.points());
+        let mut found = Vec::new();
+        let error = |(point, normal): (&[f64; 3], &[f64; 3])| {
+            tree.nearest_k(*point, 20, &mut found);
+            let plane = plane_of(found.iter().map(|(_, index)| map.points()[*index as usize]));
+            let expected = if plane.thickness <= 0.35 { plane.normal } else { [0.0; 3] };
+            let along: f64 = (0..3).map(|k| expected[k] * normal[k]).sum();
+            (0..3).map(|k| (normal[k] - expected[k].copysign(expected[k] * along)).abs()).fold(0.0, f64::max)
+        };
+        map.points().iter().zip(&map.normals).map(error).fold(0.0, f64::max)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { rng_seed: prop::test_runner::RngSeed::Fixed(9), cases: 64, ..Default::default() })]
+
+        #[test]
+        fn the_first_point_of_each_voxel_stays(
+            scans in prop::collection::vec(prop::collection::vec(prop::array::uniform3(-4.0_f64..5.0), 0..120), 0..5),
+            distance in 1.0_f64..9.0,
+        ) {
+            let mut expected: BTreeMap<[i64; 3], ([f64; 3], u32)> = BTreeMap::new();
+            for (number, points) in (0..).zip(&scans) {
+                for point in points {
+                    expected.entry(point.map(|c| c.floor() as i64)).or_insert((*point, number));
+                }
+            }
+            let mut map = map_of(&scans);
+            let of = |map: &LocalMap| -> BTreeMap<[i64; 3], ([f64; 3], u32)> {
+                let entry = |(point, scan): (&[f64; 3], &u32)| (point.map(|c| c.floor() as i64), (*point, *scan));
+                map.points().iter().zip(map.scans()).map(entry).collect()
+            };
+            prop_assert_eq!(map.len(), expected.len());
+            prop_assert_eq!(of(&map), expected.clone());
+            map.keep_within([0.5; 3], distance);
+            expected.retain(|_, (point, _)| squared_distance(point, &[0.5; 3]) <= distance * distance);
+            prop_assert_eq!(of(&map), expected);
+            // What was taken out may come again, and its voxel is free.
+            let points: Vec<[f64; 3]> = map.points().to_vec();
+            for point in &points {
+                prop_assert_eq!(map.nearest(*point, 1.0).squared, 0.0);
+            }
+        }
+
+        #[test]
+        fn normals_are_those_of_all_points_at_once(
+            scans in prop::collection::vec(
+                prop::collection::vec(
+                    prop::array::uniform2(-5.0_f64..5.0).prop_map(|[x, y]| [x, y, (0.4 * x).sin() + 0.1 * y * y]), 1..150,
+                ),
+                1..6,
+            ),
+        ) {
+            prop_assert!(largest_error_of_normals(&map_of(&scans)) < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! What odometry gives for each scan.
+
+use crate::RigidTransform;
+
+/// Why a scan has the pose that it has.
+///
+/// ```
+/// assert_eq!(surfsig::ScanStatus::Tracked.name(), "tracked");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+#[non_exhaustive]
+pub enum ScanStatus {
+    /// Found next to where it was expected.
+    Tracked = 0,
+    /// Found by the signatures of its keypoints, after tracking had failed.
+    Relocalised = 1,
+    /// Not found: no pose.
+    Lost = 2,
+    /// It has hardly any points: no pose.
+    TooFewPoints = 3,
+}
+
+impl ScanStatus {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Self; 4] = [Self::Tracked, Self::Relocalised, Self::Lost, Self::TooFewPoints];
+
+    /// Its name in lower case.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tracked => "tracked",
+            Self::Relocalised => "relocalised",
+            Self::Lost => "lost",
+            Self::TooFewPoints => "too_few_points",
+        }
+    }
+}
+
+/// A scan's pose in the map, whose frame is that of the first scan that has one.
+///
+/// ```
+/// use surfsig::{Odometry, OdometrySettings, PointCloud, Scan, ScanStatus};
+///
+/// let mut odometry = Odometry::new(OdometrySettings::default())?;
+/// let found = odometry.push(&Scan::new(PointCloud::new(&[])))?;
+/// assert_eq!(found[0].status, ScanStatus::TooFewPoints);
+/// assert!(found[0].T_map_scan.is_none() && found[0].covariance[0][0].is_nan());
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+#[allow(non_snake_case)]
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanPose {
+    /// The scan's number, from 0.
+    pub scan: usize,
+    /// Takes the scan's points to the map; `None` where the scan has no pose.
+    pub T_map_scan: Option<RigidTransform>,
+    /// Of the twist m (rotation vector in radians, then translation) in the scan's own axes by which the pose is off:
+    /// T_true = T_map_scan exp(m). It grows as the map goes on from the first scan. NaN where there is no pose.
+    pub covariance: [[f64; 6]; 6],
+    /// Why the pose is what it is.
+    pub status: ScanStatus,
+    /// Share of the scan's points that lie on the map; 0 where there is no pose.
+    pub overlap: f64,
+}
+
+impl ScanPose {
+    /// A scan without a pose.
+    pub(super) fn none(scan: usize, status: ScanStatus) -> Self {
+        Self { scan, T_map_scan: None, covariance: [[f64::NAN; 6]; 6], status, overlap: 0.0 }
+    }
+}

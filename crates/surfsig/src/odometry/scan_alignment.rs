@@ -1,0 +1,210 @@
+//! A scan aligned with the map: GICP, the last steps point to plane, and how well it then lies.
+
+use super::correspondences::Correspondences;
+use super::local_map::LocalMap;
+use super::settings::ScanAlignmentSettings;
+use super::thinned_scan::ThinnedScan;
+use crate::RigidTransform;
+use crate::alignment::{GicpSettings, blocks, clustered_covariance, gicp_with, solve_determined};
+use crate::scan::median;
+use nalgebra::{Matrix6, Vector3, Vector6};
+use std::collections::BTreeMap;
+
+/// Standard deviations of a normal distribution in the median of its absolute values.
+const DEVIATIONS_IN_MEDIAN: f64 = 1.4826;
+/// Eigenvalues of the normal matrix below this share of the largest are rounding: no step goes there.
+const ROUNDING: f64 = 1e-9;
+
+/// How a scan lies on the map; lengths are in voxels.
+#[allow(non_snake_case)]
+#[derive(Debug, Clone)]
+pub(super) struct ScanAlignment {
+    pub T_map_scan: RigidTransform,
+    /// Of the twist in the scan's axes by which the pose is off, if the map is right.
+    pub covariance: Matrix6<f64>,
+    /// Share of the scan's points that lie on the map's surface.
+    pub overlap: f64,
+    /// Share of the map's points in free space, of those that the sensor would have measured.
+    pub free_space: f64,
+    /// Share of the scan's points that the map lacks, of those that earlier scans would have measured.
+    pub unexplained: f64,
+    /// Whether the correspondences determine all six unknowns.
+    pub observable: bool,
+    /// The scans that the map's points on which it lies came from, each with its share of them.
+    pub scans: Vec<(u32, f64)>,
+}
+
+/// Aligns a scan from a pose nearby; `None` where it hardly meets the map.
+///
+/// `max_distance` is between corresponding points, in the first round; `would_be_known` tells by the scan's pose which
+/// of its points earlier scans would have measured.
+pub(super) fn align<F: Fn([f64; 3]) -> bool>(
+    scan: &ThinnedScan,
+    map: &LocalMap,
+    start: RigidTransform,
+    max_distance: f64,
+    settings: &ScanAlignmentSettings,
+    would_be_known: impl FnOnce(&RigidTransform) -> F,
+) -> Option<ScanAlignment> {
+    let mut pose = start;
+    for max_correspondence_distance in [max_distance, max_distance.min(settings.max_point_distance)] {
+        let &ScanAlignmentSettings { max_iterations, rotation_epsilon, translation_epsilon, .. } = settings;
+        let round = GicpSettings {
+            max_correspondence_distance,
+            max_iterations,
+            rotation_epsilon,
+            translation_epsilon,
+        };
+        let found = gicp_with(map, &scan.coarse, pose, &round);
+        if found.inliers < settings.min_correspondences {
+            return None;
+        }
+        pose = found.T_target_source;
+    }
+    let mut correspondences = Correspondences::new(scan.points.len());
+    for _ in 0..settings.plane_steps {
+        let plane = PointToPlane::new(scan, map, &pose, &mut correspondences, settings)?;
+        pose = pose * plane.step();
+    }
+    // Products of rotations are rotations but for rounding, which would grow with the trajectory.
+    pose = RigidTransform::from_matrix(&pose.to_matrix()).unwrap_or(pose);
+    let plane = PointToPlane::new(scan, map, &pose, &mut correspondences, settings)?;
+    let is_known = would_be_known(&pose);
+    let (mut known, mut lacking) = (0_usize, 0_usize);
+    for (point, explained) in scan.points.iter().zip(&plane.explained) {
+        let is_known = is_known(*point);
+        known += usize::from(is_known);
+        lacking += usize::from(is_known && !explained);
+    }
+    let to_scan = pose.inverse();
+    let stride = map.len().div_ceil(settings.free_space_samples.max(1)).max(1);
+    let samples = map.points().iter().step_by(stride).map(|point| to_scan.transform_point(*point));
+    Some(ScanAlignment {
+        T_map_scan: pose,
+        covariance: plane.covariance(),
+        overlap: plane.on_map as f64 / scan.points.len() as f64,
+        free_space: scan.range_image.free_space_share(samples),
+        unexplained: lacking as f64 / known.max(1) as f64,
+        observable: plane.is_observable(settings.min_observability),
+        scans: plane.shares_of_scans(map),
+    })
+}
+
+/// The inliers of a pose, linearised.
+struct PointToPlane {
+    /// How each residual changes with a twist in the scan's axes.
+    design: Vec<[f64; 6]>,
+    residuals: Vec<f64>,
+    /// The scan's points.
+    points: Vec<[f64; 3]>,
+    /// Numbers of the map's points.
+    targets: Vec<u32>,
+    /// For each point of the scan, whether the map has it.
+    explained: Vec<bool>,
+    /// Inliers, and points beside those of the map that are on no plane.
+    on_map: usize,
+    information: Matrix6<f64>,
+    gradient: Vector6<f64>,
+}
+
+impl PointToPlane {
+    /// `None` where inliers are too few.
+    fn new(
+        scan: &ThinnedScan,
+        map: &LocalMap,
+        pose: &RigidTransform,
+        correspondences: &mut Correspondences,
+        settings: &ScanAlignmentSettings,
+    ) -> Option<Self> {
+        let found = correspondences.update(map, &scan.points, pose, settings.max_point_distance);
+        // The residual r = n (p - q) of a moved point p and the map's point q with its normal n, where it has one.
+        let residual = |index: u32, point: &[f64; 3]| {
+            let moved = Vector3::from(pose.transform_point(*point));
+            let normal = Vector3::from(map.normal(index)?);
+            Some(normal.dot(&(moved - Vector3::from(map.points()[index as usize]))))
+        };
+        let residuals: Vec<Option<f64>> = found
+            .iter()
+            .zip(&scan.points)
+            .map(|(other, point)| other.and_then(|(index, _)| residual(index, point)))
+            .collect();
+        let sizes: Vec<f64> = residuals.iter().flatten().map(|residual| residual.abs()).collect();
+        let deviation = DEVIATIONS_IN_MEDIAN * median(sizes)?;
+        let limit = settings.max_residual.min(settings.max_deviation * deviation.max(settings.min_deviation));
+        let beside = settings.explained_distance * settings.explained_distance;
+        let mut plane = Self {
+            design: Vec::with_capacity(found.len()),
+            residuals: Vec::with_capacity(found.len()),
+            points: Vec::with_capacity(found.len()),
+            targets: Vec::with_capacity(found.len()),
+            explained: Vec::with_capacity(found.len()),
+            on_map: 0,
+            information: Matrix6::zeros(),
+            gradient: Vector6::zeros(),
+        };
+        let to_scan = pose.inverse();
+        for ((other, residual), point) in found.iter().zip(&residuals).zip(&scan.points) {
+            let is_beside = other.is_some_and(|(_, squared)| squared < beside);
+            let is_inlier = residual.map(|residual| residual.abs() < limit);
+            plane
+                .explained
+                .push(is_beside || residual.is_some_and(|residual| residual.abs() < settings.max_residual));
+            plane.on_map += usize::from(is_inlier.unwrap_or(is_beside));
+            let (Some(true), Some((index, _)), Some(residual)) = (is_inlier, *other, *residual) else {
+                continue;
+            };
+            // d r / d (w, v) of the pose T exp(w, v) is (p x n, n) in the scan's axes.
+            let normal = Vector3::from(to_scan.transform_vector(map.normal(index).unwrap_or_default()));
+            let torque = Vector3::from(*point).cross(&normal);
+            plane.design.push([torque.x, torque.y, torque.z, normal.x, normal.y, normal.z]);
+            plane.residuals.push(residual);
+            plane.points.push(*point);
+            plane.targets.push(index);
+        }
+        if plane.residuals.len() < settings.min_correspondences {
+            return None;
+        }
+        for (row, residual) in plane.design.iter().zip(&plane.residuals) {
+            for i in 0..6 {
+                for j in i..6 {
+                    plane.information[(i, j)] += row[i] * row[j];
+                }
+                plane.gradient[i] += row[i] * residual;
+            }
+        }
+        plane.information.fill_lower_triangle_with_upper_triangle();
+        Some(plane)
+    }
+
+    /// The motion in the scan's axes that makes the residuals least, along the directions that they determine.
+    fn step(&self) -> RigidTransform {
+        let step = -solve_determined(self.information, &self.gradient, ROUNDING);
+        let [x, y, z, translation @ ..] = <[f64; 6]>::from(step);
+        RigidTransform::from_rotation_vector([x, y, z], translation)
+    }
+
+    /// Whether the least eigenvalue, with rotations in units of the size of their torques, is large enough.
+    fn is_observable(&self, least_for_each: f64) -> bool {
+        let torques = (0..3).map(|k| self.information[(k, k)]).sum::<f64>();
+        let size = (torques / self.residuals.len() as f64).sqrt();
+        let unit = if size > 0.0 { size } else { 1.0 };
+        let scale = Vector6::from_fn(|k, _| if k < 3 { 1.0 / unit } else { 1.0 });
+        let scaled = Matrix6::from_fn(|i, j| scale[i] * self.information[(i, j)] * scale[j]);
+        scaled.symmetric_eigenvalues().min() > least_for_each * self.residuals.len() as f64
+    }
+
+    /// By blocks of neighbouring points, or by points where blocks are few.
+    fn covariance(&self) -> Matrix6<f64> {
+        let block = blocks(&self.points).unwrap_or_else(|| (0..self.points.len() as u32).collect());
+        clustered_covariance(&self.design, &self.residuals, &block)
+    }
+
+    fn shares_of_scans(&self, map: &LocalMap) -> Vec<(u32, f64)> {
+        let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
+        for target in &self.targets {
+            *counts.entry(map.scans()[*target as usize]).or_default() += 1;
+        }
+        let all = self.targets.len() as f64;
+        counts.into_iter().map(|(scan, count)| (scan, count as f64 / all)).collect()
+    }
+}
