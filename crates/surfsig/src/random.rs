@@ -13,7 +13,8 @@ pub(crate) fn uniform(draw: usize, stream: u64) -> f64 {
 pub(crate) fn some_of(count: usize, most: usize) -> Vec<usize> {
     let mut numbers: Vec<usize> = (0..count).collect();
     if most < count {
-        numbers.select_nth_unstable_by(most, |&a, &b| uniform(a, 0).total_cmp(&uniform(b, 0)).then(a.cmp(&b)));
+        numbers
+            .select_nth_unstable_by(most, |&a, &b| uniform(a, 0).total_cmp(&uniform(b, 0)).then(a.cmp(&b)));
         numbers.truncate(most);
         numbers.sort_unstable();
     }

@@ -6,7 +6,7 @@ use crate::scan::median;
 use rayon::prelude::*;
 
 /// Points that tell the spacing of all.
-const MEASURED: usize = 20_000;
+const MEASURED: usize = 5000;
 /// Points that a thread measures at a time.
 const PART: usize = 256;
 
@@ -36,9 +36,9 @@ mod tests {
         let number = |i: usize| (i as f64 * 12.9898).sin() * 43_758.545_3 % 1.0;
         let points: Vec<[f64; 3]> = (0..301).map(|i| [0, 1, 2].map(|k| number(3 * i + k))).collect();
         let to_nearest = |i: usize| {
-            let others = (0..points.len()).filter(|&k| k != i).map(|k| {
-                (0..3).map(|axis| (points[i][axis] - points[k][axis]).powi(2)).sum::<f64>().sqrt()
-            });
+            let others = (0..points.len())
+                .filter(|&k| k != i)
+                .map(|k| (0..3).map(|axis| (points[i][axis] - points[k][axis]).powi(2)).sum::<f64>().sqrt());
             others.fold(f64::INFINITY, f64::min)
         };
         let slow = median((0..points.len()).map(to_nearest).collect()).unwrap();

@@ -190,12 +190,28 @@ mod tests {
     }
 
     #[test]
+    fn what_faces_away_from_the_viewpoint_is_not_needed() {
+        let points = box_points();
+        let viewpoint = [30.0, 40.0, 50.0];
+        let seen = facing(&RigidTransform::identity(), &points, viewpoint);
+        assert!(seen.len() < points.len() && seen.iter().all(|point| point.normal.iter().sum::<f32>() > 0.0));
+        let surface = OrientedSurface::new(seen);
+        let start = RigidTransform::from_rotation_vector([0.02, -0.01, 0.02], [0.4, -0.3, 0.2]);
+        let [all, some] = [None, Some(viewpoint)]
+            .map(|viewpoint| surface.align_all(&[start], &points, &[1.5; 4], viewpoint)[0]);
+        assert_eq!(all, some);
+        assert!(some.log().iter().all(|component| component.abs() < 0.05), "{some:?}");
+    }
+
+    #[test]
     fn a_plane_makes_no_motion_that_it_does_not_determine() {
         let plane: Vec<SurfacePlace> =
             box_points().into_iter().filter(|point| point.normal == [0.0, 0.0, 1.0]).collect();
         let surface = OrientedSurface::new(plane.clone());
         let start = RigidTransform::from_rotation_vector([0.0, 0.0, 0.3], [0.7, -0.4, 0.5]);
-        let [found] = surface.align_all(&[start], &plane, &[2.0; 4], None)[..] else { panic!("one transform") };
+        let [found] = surface.align_all(&[start], &plane, &[2.0; 4], None)[..] else {
+            panic!("one transform")
+        };
         let wanted = RigidTransform::from_rotation_vector([0.0, 0.0, 0.3], [0.7, -0.4, 0.0]);
         let off = (found * wanted.inverse()).log();
         assert!(off.iter().all(|component| component.abs() < 1e-6), "{found:?}");

@@ -54,7 +54,6 @@ pub fn match_fields(source: &FieldPlaces, target: &FieldPlaces, mutual: bool) ->
         return Vec::new();
     }
     let nearest = most_similar(&source.vectors, &target.vectors);
-    crate::finding::tick("similar");
     let back = if mutual { most_similar(&target.vectors, &source.vectors) } else { Vec::new() };
     let is_mutual = |&(place, (other, _)): &(usize, (usize, f32))| !mutual || back[other].0 == place;
     let mut kept: Vec<(usize, (usize, f32))> = nearest.into_iter().enumerate().filter(is_mutual).collect();
@@ -65,9 +64,7 @@ pub fn match_fields(source: &FieldPlaces, target: &FieldPlaces, mutual: bool) ->
         distance: (2.0 - 2.0 * product).max(0.0).sqrt(),
         T_target_source: transform(source, place, target, other),
     };
-    let out = kept.into_par_iter().with_min_len(16).map(matched).collect();
-    crate::finding::tick("transforms");
-    out
+    kept.into_par_iter().with_min_len(16).map(matched).collect()
 }
 
 /// For each vector the number of the one with the largest scalar product, the first of several, and the product.

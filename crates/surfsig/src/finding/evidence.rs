@@ -7,6 +7,7 @@ use super::scene::SceneSurface;
 use crate::alignment::{FACING_AWAY, cosine_towards, transformed};
 use crate::depth_image::{ALIKE, FACING, SurfacePlace, dot};
 use crate::geometry::RigidTransform;
+use crate::kd_tree::KdTree;
 use crate::random::some_of;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -68,7 +69,12 @@ impl<'a> ModelView<'a> {
         most: usize,
         settings: &'a FindSettings,
     ) -> Self {
-        let samples = model.surface(&some_of(model.samples.len(), most));
+        let chosen = some_of(model.samples.len(), most);
+        let points: Vec<[f64; 3]> = chosen.iter().map(|&i| model.samples[i]).collect();
+        // In the order of a tree's leaves, searches one after the other find their part of another tree in the cache.
+        let near_each_other = KdTree::new(&points);
+        let order: Vec<usize> = near_each_other.indices().iter().map(|&i| chosen[i as usize]).collect();
+        let samples = model.surface(&order);
         let rim = Rim::new(model, &samples, scene.voxel);
         let most_seen = most_seen(&samples);
         Self { rim, scene, viewpoint, reach: REACH * model.extent(), most_seen, samples, settings }
@@ -95,10 +101,7 @@ impl<'a> ModelView<'a> {
     /// Weighs transforms (T_scene_model); `is_free` says which samples of the scene no other instance explains.
     pub fn judged(&self, transforms: &[RigidTransform], is_free: &[bool]) -> Vec<Evidence> {
         let Some(viewpoint) = self.viewpoint else {
-            return transforms
-                .par_iter()
-                .map(|transform| self.weighed(transform, None, is_free))
-                .collect();
+            return transforms.par_iter().map(|transform| self.weighed(transform, None, is_free)).collect();
         };
         let edge = CELL * self.reach;
         let mut cells: FxHashMap<[i64; 3], Vec<usize>> = FxHashMap::default();
@@ -117,8 +120,8 @@ impl<'a> ModelView<'a> {
                 let found = image.judge(&local, &self.samples, self.scene.voxel as f32);
                 let [confirmed, contradicted, missing] =
                     [found.confirmed, found.contradicted, found.missing].map(f64::from);
-                let wrong = self.settings.contradicted_weight * contradicted
-                    + self.settings.missing_weight * missing;
+                let wrong =
+                    self.settings.contradicted_weight * contradicted + self.settings.missing_weight * missing;
                 // In the model's axes only one point has to be moved.
                 let from = transform.inverse().transform_point(viewpoint).map(|x| x as f32);
                 let cosines: Vec<f32> =
@@ -131,8 +134,7 @@ impl<'a> ModelView<'a> {
             };
             numbers.iter().map(judged).collect::<Vec<_>>()
         };
-        let mut judged: Vec<(usize, Evidence)> =
-            cells.par_iter().map(of_cell).flatten_iter().collect();
+        let mut judged: Vec<(usize, Evidence)> = cells.par_iter().map(of_cell).flatten_iter().collect();
         judged.sort_unstable_by_key(|(number, _)| *number);
         judged.into_iter().map(|(_, evidence)| evidence).collect()
     }
@@ -182,7 +184,8 @@ impl<'a> ModelView<'a> {
             let gap = [0, 1, 2].map(|k| near.place[k] - sample.place[k]);
             let residual = dot(&gap, &near.normal) / touching;
             let cosine = dot(&sample.normal, &near.normal);
-            let agreement = (1.0 - residual * residual).max(0.0) * ((cosine - ALIKE) / (1.0 - ALIKE)).max(0.0);
+            let agreement =
+                (1.0 - residual * residual).max(0.0) * ((cosine - ALIKE) / (1.0 - ALIKE)).max(0.0);
             sum += f64::from(agreement);
             count += 1.0;
         }

@@ -28,18 +28,6 @@ use proposals::{different, proposed_transforms};
 use scene::Scene;
 use std::sync::Arc;
 
-pub(crate) fn tick(what: &str) {
-    use std::time::Instant;
-    static LAST: std::sync::Mutex<Option<Instant>> = std::sync::Mutex::new(None);
-    if std::env::var_os("SURFSIG_TIMES").is_some() {
-        let mut last = LAST.lock().unwrap();
-        if let Some(last) = *last {
-            eprintln!("{what}: {:.3}", last.elapsed().as_secs_f64());
-        }
-        *last = Some(Instant::now());
-    }
-}
-
 /// Steps of each model that [`Monitor::done`] counts; [`find_instances`] takes one more before and after all.
 pub const FIND_STEPS_PER_MODEL: usize = 3;
 
@@ -86,23 +74,19 @@ pub fn find_instances(
 ) -> Result<Vec<Instance>, Error> {
     models.iter().try_for_each(|model| model.check())?;
     with_threads(settings.threads, || {
-        tick("-");
         let scan = CenteredScan::new(scene);
-        tick("centered");
         let radii = models.iter().map(|model| model.places.radius);
         let radius = radii.fold(f64::INFINITY, f64::min);
         if scan.points.len() < MIN_POINTS || models.is_empty() {
             return Ok(Vec::new());
         }
         let mut scene = Scene::new(scan, free_space_viewpoint, radius, settings, monitor)?;
-        tick("scene");
         monitor.add(1);
         let mut candidates = Vec::new();
         for (number, model) in models.iter().enumerate() {
             candidates.extend(candidates_of(number, model, &mut scene, settings, monitor)?);
         }
         let found = accepted(candidates, &scene, models, settings, monitor)?;
-        tick("accepted");
         monitor.add(1);
         Ok(found)
     })?
@@ -117,12 +101,9 @@ fn candidates_of<'a>(
     monitor: &Monitor,
 ) -> Result<Vec<Candidate<'a>>, Error> {
     let least = SPACINGS_PER_RADIUS * scene.spacing;
-    let model =
-        if model.places.radius < least { model.with_radius(least, monitor)? } else { model.clone() };
+    let model = if model.places.radius < least { model.with_radius(least, monitor)? } else { model.clone() };
     let voxel = scene.voxel(&model)?;
-    tick("voxel");
     let places = scene.places(model.places.radius, voxel)?;
-    tick(&format!("{} places", places.len()));
     let (coarse, fine) = (scene.coarse_surface(voxel)?, scene.fine_surface(voxel)?);
     tick(&format!("surfaces {} {}", coarse.samples().len(), fine.samples().len()));
     monitor.add(1);
@@ -142,7 +123,6 @@ fn candidates_of<'a>(
         let first = view(&coarse, settings.first_points);
         let kept = best_first(&first, &proposed, settings.first_distances).take(settings.kept);
         let kept: Vec<RigidTransform> = kept.collect();
-        tick(&format!("first kept {}", kept.len()));
         let second = view(&coarse, settings.coarse_points);
         let [distance, angle] = settings.same;
         let tried = different(
@@ -151,17 +131,13 @@ fn candidates_of<'a>(
             distance * side.places.radius,
             angle,
         );
-        tick(&format!("tried {}", tried.len()));
         monitor.check()?;
         if tried.is_empty() {
             continue;
         }
         let last = view(&fine, settings.fine_points);
-        tick(&format!("last view {}", last.samples.len()));
         let aligned = last.aligned(&tried, settings.fine_distances, settings.aligned_points);
-        tick("aligned");
         let judged = last.judged(&aligned, &vec![true; fine.samples().len()]);
-        tick("judged");
         let sought = Arc::new(Sought::new(number, side, last));
         let good = aligned.into_iter().zip(judged).filter(|(_, found)| found.score >= settings.min_score);
         candidates.extend(good.map(|(transform, evidence)| Candidate {

@@ -137,12 +137,7 @@ impl Model {
     pub(super) fn check(&self) -> Result<(), Error> {
         let finite = |points: &[[f64; 3]]| points.iter().flatten().all(|x| x.is_finite());
         let places = &self.places;
-        let lengths = [
-            places.vectors.len(),
-            places.axes.len(),
-            places.tangents.len(),
-            places.phases.len(),
-        ];
+        let lengths = [places.vectors.len(), places.axes.len(), places.tangents.len(), places.phases.len()];
         let is_whole = self.normals.len() == self.samples.len()
             && !self.samples.is_empty()
             && self.points.len() >= MIN_POINTS

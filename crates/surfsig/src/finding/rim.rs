@@ -57,8 +57,7 @@ impl Rim {
                 let beside: [f64; 3] = (Vector3::from(sample.place.map(f64::from)) + offset).into();
                 if tree.nearest(beside, CLEARANCE * voxel).is_none() {
                     from.push(number);
-                    points
-                        .push(SurfacePlace { place: beside.map(|x| x as f32), normal: sample.normal });
+                    points.push(SurfacePlace { place: beside.map(|x| x as f32), normal: sample.normal });
                 }
             }
         }
@@ -87,7 +86,8 @@ impl Rim {
                 && is_free[near]
             {
                 let gap = [0, 1, 2].map(|k| scene.samples()[near].place[k] - point.place[k]);
-                going_on += usize::from(f64::from(dot(&gap, &point.normal).abs()) < MAX_RESIDUAL * scene.voxel);
+                going_on +=
+                    usize::from(f64::from(dot(&gap, &point.normal).abs()) < MAX_RESIDUAL * scene.voxel);
             }
         }
         if asked < MIN_POINTS {

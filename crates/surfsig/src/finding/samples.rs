@@ -19,7 +19,7 @@ const NORMAL_BALL: f64 = 3.0;
 /// Coefficients of the paraboloid in them.
 const UNKNOWNS: f64 = 6.0;
 /// Voxels along a patch's radius to which points are thinned before patches are described.
-const DESCRIPTION_VOXELS: f64 = 24.0;
+const DESCRIPTION_VOXELS: f64 = 20.0;
 /// Places with a signature along a patch's radius.
 const PLACES_PER_RADIUS: f64 = 4.0;
 /// Cells along a patch's radius in which normals are compared.
@@ -44,17 +44,12 @@ impl Samples {
         let ball = Radius::new(NORMAL_BALL * voxel)?;
         let thinned = scan.thinned(voxel);
         let given = thinned.scan();
-        let options = ExtractOptions {
-            viewpoint: given.viewpoint,
-            directions: given.directions,
-            ..Default::default()
-        };
+        let options =
+            ExtractOptions { viewpoint: given.viewpoint, directions: given.directions, ..Default::default() };
         let found = extract_within(&given.cloud, ball.into(), &Queries::All, &options, &monitor.apart())?;
         let known = (0..found.len()).filter(|&i| found.normals[i].iter().all(|c| c.is_finite()));
-        let point = |i: usize| SurfacePlace {
-            place: thinned.points[i].map(|x| x as f32),
-            normal: found.normals[i],
-        };
+        let point =
+            |i: usize| SurfacePlace { place: thinned.points[i].map(|x| x as f32), normal: found.normals[i] };
         Ok(Self { points: known.map(point).collect(), noise: noise(scan, ball, monitor)? })
     }
 }
@@ -64,8 +59,7 @@ fn noise(scan: &CenteredScan, ball: Radius, monitor: &Monitor) -> Result<f64, Er
     let some: Vec<u32> = some_of(scan.points.len(), MEASURED).into_iter().map(|i| i as u32).collect();
     let cloud = scan.scan().cloud;
     let options = ExtractOptions::default();
-    let found =
-        extract_within(&cloud, ball.into(), &Queries::Indices(&some), &options, &monitor.apart())?;
+    let found = extract_within(&cloud, ball.into(), &Queries::Indices(&some), &options, &monitor.apart())?;
     let deviation = |i: usize| {
         let count = f64::from(found.count[i]);
         let deviation = f64::from(found.residual[i]) * (count / (count - UNKNOWNS)).sqrt();
@@ -87,14 +81,10 @@ pub(super) fn described(
     let mut indices = voxel_representatives(&given.cloud, Radius::new(radius / PLACES_PER_RADIUS)?)?;
     indices.retain(|&i| cells.is_bent(&thinned.points[i as usize]));
     let points: Vec<[f64; 3]> = indices.iter().map(|&i| thinned.points[i as usize]).collect();
-    let options = FieldOptions {
-        viewpoint: given.viewpoint,
-        directions: given.directions,
-        ..Default::default()
-    };
+    let options =
+        FieldOptions { viewpoint: given.viewpoint, directions: given.directions, ..Default::default() };
     let queries = Queries::Indices(&indices);
-    let found =
-        signatures_within(&given.cloud, Radius::new(radius)?, &queries, &options, &monitor.apart())?;
+    let found = signatures_within(&given.cloud, Radius::new(radius)?, &queries, &options, &monitor.apart())?;
     Ok(FieldPlaces::known(radius, &indices, &points, &found))
 }
 
@@ -175,4 +165,47 @@ pub(super) fn mean_length<'a>(vectors: impl ExactSizeIterator<Item = &'a [f32; 3
     let count = vectors.len().max(1) as f64;
     let sum = vectors.map(|vector| Vector3::from(vector.map(f64::from))).sum::<Vector3<f64>>();
     sum.norm() / count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_is_near_a_bend_is_bent() {
+        // A floor and a wall that meet at x = 10.
+        let floor = (0..40 * 40)
+            .map(|i| ([0.25 * f64::from(i % 40), 0.25 * f64::from(i / 40), 0.0], [0.0, 0.0, 1.0]));
+        let wall = (0..40 * 40)
+            .map(|i| ([10.0, 0.25 * f64::from(i % 40), 0.25 * f64::from(i / 40)], [-1.0, 0.0, 0.0]));
+        let samples: Vec<SurfacePlace> = floor
+            .chain(wall)
+            .map(|(place, normal)| SurfacePlace { place: place.map(|x| x as f32), normal })
+            .collect();
+        let cells = NormalCells::new(&samples, 1.0);
+        for sample in &samples {
+            let point = sample.place.map(f64::from);
+            let to_bend = (10.0 - point[0]).max(point[2]);
+            // A patch of radius 1 that reaches the bend, and none that is far from doing so.
+            assert!(cells.is_bent(&point) || to_bend > 1.0, "{point:?}");
+            assert!(!cells.is_bent(&point) || to_bend < 2.0, "{point:?}");
+            assert!(cells.is_around(&point) || to_bend > 2.0, "{point:?}");
+            assert!(!cells.is_around(&point) || to_bend < 4.0, "{point:?}");
+        }
+        assert_eq!(block([0, 5, -3], 1).count(), 27);
+    }
+
+    #[test]
+    fn noise_is_the_standard_deviation_from_the_surface() {
+        let number = |i: usize| (0..12).map(|k| crate::random::uniform(12 * i + k, 5)).sum::<f64>() - 6.0;
+        let points: Vec<[f64; 3]> =
+            (0..3600).map(|i| [(i % 60) as f64, (i / 60) as f64, 0.2 * number(i)]).collect();
+        let scan = CenteredScan::new(
+            &crate::Scan::new(crate::PointCloud::new_f64(&points)).seen_from([30.0, 30.0, 1e3]),
+        );
+        let found = Samples::new(&scan, 2.0, &Monitor::default()).unwrap();
+        assert!((found.noise - 0.2).abs() < 0.02, "{}", found.noise);
+        assert!((found.points.len() as f64 - 900.0).abs() < 100.0);
+        assert!(found.points.iter().all(|sample| sample.normal[2] > 0.8));
+    }
 }

@@ -86,8 +86,7 @@ impl<'a> Scene<'a> {
 
     /// Distance between the samples in which a model is looked for.
     pub fn voxel(&mut self, model: &Model) -> Result<f64, Error> {
-        let voxel =
-            model.voxel().max(model.spacing).max(self.settings.spacings_per_voxel * self.spacing);
+        let voxel = model.voxel().max(model.spacing).max(self.settings.spacings_per_voxel * self.spacing);
         Ok(voxel.max(self.settings.noises_per_voxel * self.samples(voxel)?.noise))
     }
 

@@ -89,7 +89,7 @@ impl Default for FindSettings {
             agreement: [0.5, 0.35],
             merged_share: 0.5,
             same: [0.25, 0.2],
-            max_fitted: 5000,
+            max_fitted: 3000,
             point_to_surface: PointToSurfaceSettings::default(),
             own_distance: 1.5,
             contradicted_weight: 5.0,

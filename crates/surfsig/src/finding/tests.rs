@@ -13,9 +13,8 @@ use std::f64::consts::PI;
 const BODY: [([f64; 3], [f64; 3]); 2] = [([1.0, 1.3, 1.6], [0.0; 3]), ([0.7, 0.5, 0.9], [0.5, 0.9, 1.0])];
 
 fn inside(point: Vector3<f64>) -> bool {
-    BODY.iter().any(|(axes, center)| {
-        (0..3).map(|k| ((point[k] - center[k]) / axes[k]).powi(2)).sum::<f64>() < 0.999
-    })
+    BODY.iter()
+        .any(|(axes, center)| (0..3).map(|k| ((point[k] - center[k]) / axes[k]).powi(2)).sum::<f64>() < 0.999)
 }
 
 /// Points all over the body, and outward normals.
@@ -47,7 +46,8 @@ fn scene(viewpoint: [f64; 3]) -> (Vec<[f64; 3]>, [RigidTransform; 2]) {
             poses.iter().any(|pose| inside(pose.inverse().transform_point(between.into()).into()))
         })
     };
-    let floor = (0..160 * 110).map(|i| [0.08 * f64::from(i % 160) - 6.4, 0.08 * f64::from(i / 160) - 4.4, -2.4]);
+    let floor =
+        (0..160 * 110).map(|i| [0.08 * f64::from(i % 160) - 6.4, 0.08 * f64::from(i / 160) - 4.4, -2.4]);
     let mut points: Vec<[f64; 3]> = floor.collect();
     for pose in &poses {
         points.extend(body(6000).into_iter().map(|(point, _)| pose.transform_point(point)));
@@ -88,8 +88,7 @@ fn two_half_seen_bodies_are_found_wherever_the_scene_is_and_on_any_number_of_thr
     }
     assert_eq!(found, found_in(&points, viewpoint, Some(3)).unwrap());
     let motion = RigidTransform::from_rotation_vector([0.3, 1.2, -0.4], [4e5, 5e6, 100.0]);
-    let moved =
-        found_in(&motion.transform_points(&points), motion.transform_point(viewpoint), None).unwrap();
+    let moved = found_in(&motion.transform_points(&points), motion.transform_point(viewpoint), None).unwrap();
     assert_eq!(moved.len(), 2);
     for (here, there) in found.iter().zip(&moved) {
         let off = (here.T_scene_model.inverse() * motion.inverse() * there.T_scene_model).log();
