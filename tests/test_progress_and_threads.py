@@ -17,7 +17,9 @@ RNG = np.random.default_rng(51)
 POINTS = surface_scenes.box().points[::4]
 BALL = np.concatenate([sphere(RNG, 0.0, 0.005, 800), sphere(RNG, -1.0, 0.005, 300) + np.array([4, 0, 0])])
 EGG = sphere(RNG, -1.0, 0.0, 3000)
-BENT_EGG = EGG * (1.0, 0.7, 1.6) + np.column_stack([0.4 * EGG[:, 2] ** 2, 0.3 * EGG[:, 0] * EGG[:, 2], 0 * EGG[:, 0]])
+BENT_EGG = EGG * (1.0, 0.7, 1.6) + np.column_stack(
+    [0.4 * EGG[:, 2] ** 2, 0.3 * EGG[:, 0] * EGG[:, 2], 0 * EGG[:, 0]]
+)
 FIELDS = surfsig.extract_field_signatures(POINTS, 0.4, voxel=0.2)
 SIGNATURES = RNG.normal(size=(2500, 242))
 TWO_BALLS = surfsig.PointCloud(

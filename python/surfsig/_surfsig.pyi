@@ -197,6 +197,7 @@ def register(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> dict[str, Any]: ...
+
 @final
 class FindSettings:
     """How instances are searched and judged, for experts: what is not given keeps its default.

@@ -91,7 +91,7 @@ def hidden_from(direction: Array, places: Array, points: Array, spacing: float) 
 
 
 def _cells_across(points: Array, across: Array, edge: float) -> NDArray[np.int64]:
-    """Give the squares (n, 2), of an edge, that points (n, 3) are in, seen along what two axes (2, 3) are across."""
+    """Give the squares (n, 2) of an edge that points (n, 3) are in, along two axes (2, 3)."""
     # Column by column: a product with so few columns takes ten times as long.
     x, y, z = points.T
     columns = [np.floor((x * axis[0] + y * axis[1] + z * axis[2]) / edge) for axis in across]

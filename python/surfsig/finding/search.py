@@ -36,12 +36,12 @@ def find_instances(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Instances:
-    """Find every instance of a model, or of several, in a scene: transform, score, and how much of it is seen.
+    """Find every instance of a model, or of several, in a scene: transform, score, how much of it is seen.
 
     Each place of the scene proposes a transform by the place of the model whose field signature is most like
-    its own. Transforms that many agree on are fitted to the scene's surface and judged by what the sensor saw:
-    what of the model is confirmed by points, less what it saw through and where it saw nothing. The best is
-    taken, with its points, and the others are judged again without these, until none is left that is good
+    its own. Transforms that many agree on are fitted to the scene's surface and judged by what the sensor
+    saw: what of the model is confirmed by points, less what it saw through and where it saw nothing. The best
+    is taken, with its points, and the others are judged again without these, until none is left that is good
     enough. So half hidden instances are found, and where there is none, none is. The result is always the
     same.
 

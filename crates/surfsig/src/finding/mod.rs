@@ -105,7 +105,6 @@ fn candidates_of<'a>(
     let voxel = scene.voxel(&model)?;
     let places = scene.places(model.places.radius, voxel)?;
     let (coarse, fine) = (scene.coarse_surface(voxel)?, scene.fine_surface(voxel)?);
-    tick(&format!("surfaces {} {}", coarse.samples().len(), fine.samples().len()));
     monitor.add(1);
     let mut sides = vec![model];
     if !(sides[0].is_sided && scene.is_oriented) {
@@ -119,7 +118,6 @@ fn candidates_of<'a>(
             ModelView::new(&side, Arc::clone(surface), scene.viewpoint, most, settings)
         };
         let proposed = proposed_transforms(&side.places, &places, settings);
-        tick(&format!("proposed {} by {}", proposed.len(), side.places.len()));
         let first = view(&coarse, settings.first_points);
         let kept = best_first(&first, &proposed, settings.first_distances).take(settings.kept);
         let kept: Vec<RigidTransform> = kept.collect();
