@@ -101,7 +101,7 @@ fn two_half_seen_bodies_are_found_wherever_the_scene_is_and_on_any_number_of_thr
 /// A model without signatures: samples with their normals.
 fn model_of(samples: Vec<([f64; 3], Vector3<f64>)>) -> Model {
     let (samples, normals): (Vec<[f64; 3]>, Vec<[f64; 3]>) =
-        samples.into_iter().map(|(point, normal)| (point, normal.into())).unzip();
+        samples.into_iter().map(|(point, normal)| (point, <[f64; 3]>::from(normal))).unzip();
     Model {
         points: samples.clone(),
         center: [0.0; 3],
