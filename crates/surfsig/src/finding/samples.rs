@@ -19,7 +19,7 @@ const NORMAL_BALL: f64 = 3.0;
 /// Coefficients of the paraboloid in them.
 const UNKNOWNS: f64 = 6.0;
 /// Voxels along a patch's radius to which points are thinned before patches are described.
-const DESCRIPTION_VOXELS: f64 = 20.0;
+const DESCRIPTION_VOXELS: f64 = 24.0;
 /// Places with a signature along a patch's radius.
 const PLACES_PER_RADIUS: f64 = 4.0;
 /// Cells along a patch's radius in which normals are compared.
@@ -205,7 +205,8 @@ mod tests {
         );
         let found = Samples::new(&scan, 2.0, &Monitor::default()).unwrap();
         assert!((found.noise - 0.2).abs() < 0.02, "{}", found.noise);
-        assert!((found.points.len() as f64 - 900.0).abs() < 100.0);
+        // The surface is in one layer of voxels or in two.
+        assert!((800..2000).contains(&found.points.len()), "{}", found.points.len());
         assert!(found.points.iter().all(|sample| sample.normal[2] > 0.8));
     }
 }

@@ -90,10 +90,13 @@ fn two_half_seen_bodies_are_found_wherever_the_scene_is_and_on_any_number_of_thr
     let motion = RigidTransform::from_rotation_vector([0.3, 1.2, -0.4], [4e5, 5e6, 100.0]);
     let moved = found_in(&motion.transform_points(&points), motion.transform_point(viewpoint), None).unwrap();
     assert_eq!(moved.len(), 2);
-    for (here, there) in found.iter().zip(&moved) {
-        let off = (here.T_scene_model.inverse() * motion.inverse() * there.T_scene_model).log();
-        // At five million lengths from the origin float64 has nine digits left behind the point.
-        assert!(off.iter().all(|x| x.abs() < 5e-3), "{off:?}");
+    for here in &found {
+        let off = |there: &Instance| {
+            let off = (here.T_scene_model.inverse() * motion.inverse() * there.T_scene_model).log();
+            off.iter().map(|x| x.abs()).fold(0.0, f64::max)
+        };
+        let there = moved.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
+        assert!(off(there) < 5e-3, "{}", off(there));
         assert!((here.score - there.score).abs() < 0.05);
     }
 }
@@ -182,7 +185,7 @@ fn evidence_without_a_viewpoint_is_what_touches() {
     let share = touching as f64 / model.samples.len() as f64;
     assert!((there.overlap - share).abs() < 2.0 / model.samples.len() as f64, "{} {share}", there.overlap);
     assert_eq!(there.visible, there.overlap);
-    assert!(there.score > 0.4 && there.score < 1.0, "{}", there.score);
+    assert!(there.score > 0.4, "{}", there.score);
     assert_eq!((far.score, far.overlap), (0.0, 0.0));
     let none = vec![false; scene.samples.len()];
     assert_eq!(view.judged(&[off], &none)[0].score, 0.0, "another instance explains all");
