@@ -98,7 +98,7 @@ def some_normals(points: NDArray[np.float32]) -> NDArray[np.float32]:
         (RADIUS, {"at": np.array([[0.1, 0.2, 0.0], [9.0, 9.0, 9.0], [np.nan, 0.0, 0.0]])}),
         ("auto", {"at": np.array([[0.1, 0.2, 0.0]]), "viewpoint": [0.0, 0.0, -9.0]}),
     ],
-    ids=str,
+    ids=lambda value: " ".join(value) if isinstance(value, dict) else str(value),
 )
 def test_values_of_each_way_to_extract(
     c: CInterface, points: NDArray[np.float32], radius: float | Literal["auto"], how: dict[str, Any]

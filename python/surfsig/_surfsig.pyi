@@ -20,6 +20,7 @@ __all__ = [
     "FindSettings",
     "Frame",
     "Odometry",
+    "OdometrySettings",
     "Primitive",
     "RegistrationSettings",
     "SurfacePlaces",
@@ -423,6 +424,91 @@ class Frame:
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]: ...
 
 @final
+class OdometrySettings:
+    """How a sensor is followed, for experts: what is not given keeps its default.
+
+    The crate's `OdometrySettings` says why each has its value.
+    """
+
+    def __new__(
+        cls,
+        *,
+        voxels_of_scan: float | None = None,
+        patch_radius: float | None = None,
+        min_points: int | None = None,
+        coarse_voxel: float | None = None,
+        plane_steps: int | None = None,
+        max_point_distance: float | None = None,
+        max_residual: float | None = None,
+        min_observability: float | None = None,
+        map_range_factor: float | None = None,
+        map_min_translation: float | None = None,
+        map_min_rotation: float | None = None,
+        prediction_max_deviation: float | None = None,
+        expectation_scans: int | None = None,
+        doubted_overlap: float | None = None,
+        min_overlap: float | None = None,
+        max_keyframes: int | None = None,
+        min_matches: int | None = None,
+        scans_on_trial: int | None = None,
+    ) -> OdometrySettings: ...
+    @property
+    def voxels_of_scan(self) -> float:
+        """Voxels that the first scan fills, where no voxel is given."""
+    @property
+    def patch_radius(self) -> float:
+        """Radius of the patches that keypoints are described by, in median ranges."""
+    @property
+    def min_points(self) -> int:
+        """Points of a scan without which it is not aligned."""
+    @property
+    def coarse_voxel(self) -> float:
+        """Edge, in voxels, of the coarser voxels of which generalised ICP takes a scan's points."""
+    @property
+    def plane_steps(self) -> int:
+        """Steps point to plane that follow it."""
+    @property
+    def max_point_distance(self) -> float:
+        """Largest distance between corresponding points in the last steps, in voxels."""
+    @property
+    def max_residual(self) -> float:
+        """Largest point-to-plane residual of an inlier, in voxels."""
+    @property
+    def min_observability(self) -> float:
+        """Least eigenvalue of the normal matrix for one correspondence with which a pose is observable."""
+    @property
+    def map_range_factor(self) -> float:
+        """Range of the map over the distance within which 99 in 100 points of a scan are."""
+    @property
+    def map_min_translation(self) -> float:
+        """Translation, in voxels, from which on the next scan goes into the map."""
+    @property
+    def map_min_rotation(self) -> float:
+        """Rotation, in radians, likewise."""
+    @property
+    def prediction_max_deviation(self) -> float:
+        """Largest distance of corresponding points, in root mean squares of the errors of predictions."""
+    @property
+    def expectation_scans(self) -> int:
+        """Scans that the expected overlap is taken from."""
+    @property
+    def doubted_overlap(self) -> float:
+        """Share of the expected overlap below which a pose is doubted."""
+    @property
+    def min_overlap(self) -> float:
+        """Overlap of a pose that is believed, at least."""
+    @property
+    def max_keyframes(self) -> int:
+        """Keyframes that are searched, at most, the latest first."""
+    @property
+    def min_matches(self) -> int:
+        """Matches that agree with a pose that is tried, at least."""
+    @property
+    def scans_on_trial(self) -> int:
+        """Scans that must follow each other where the sensor is found again."""
+    def __eq__(self, value: object, /) -> bool: ...
+
+@final
 class Odometry:
     def __new__(
         cls,
@@ -430,6 +516,7 @@ class Odometry:
         voxel: float | None = None,
         max_correspondence_distance: float | None = None,
         map_range: float | None = None,
+        settings: OdometrySettings | None = None,
         threads: int | None = None,
     ) -> Odometry: ...
     def push(

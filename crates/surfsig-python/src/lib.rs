@@ -71,7 +71,7 @@ mod _surfsig {
     #[pymodule_export]
     use crate::neighbor_distances::mean_neighbor_distances;
     #[pymodule_export]
-    use crate::odometry::Odometry;
+    use crate::odometry::{Odometry, OdometrySettings};
     #[pymodule_export]
     use crate::primitive::{Primitive, fit_primitive};
     #[pymodule_export]

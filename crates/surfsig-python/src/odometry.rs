@@ -1,11 +1,54 @@
 //! Odometry, for Python.
 
 use crate::extract::Points;
+use crate::settings::settings_class;
 use crate::to_python;
 use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use surfsig::{OdometrySettings, Scan};
+use surfsig::Scan;
+
+settings_class! {
+    /// How a sensor is followed, for experts; see `surfsig.estimate_odometry`.
+    OdometrySettings of surfsig::OdometrySettings {
+        /// Voxels that the first scan fills, where no voxel is given.
+        voxels_of_scan: f64 = scale.voxels_of_scan,
+        /// Radius of the patches that keypoints are described by, in median ranges.
+        patch_radius: f64 = scale.patch_radius,
+        /// Points of a scan without which it is not aligned.
+        min_points: usize = scale.min_points,
+        /// Edge, in voxels, of the coarser voxels of which generalised ICP takes a scan's points.
+        coarse_voxel: f64 = alignment.coarse_voxel,
+        /// Steps point to plane that follow it.
+        plane_steps: usize = alignment.plane_steps,
+        /// Largest distance between corresponding points in the last steps, in voxels.
+        max_point_distance: f64 = alignment.max_point_distance,
+        /// Largest point-to-plane residual of an inlier, in voxels.
+        max_residual: f64 = alignment.max_residual,
+        /// Least eigenvalue of the normal matrix for one correspondence with which a pose is observable.
+        min_observability: f64 = alignment.min_observability,
+        /// Range of the map over the distance within which 99 in 100 points of a scan are.
+        map_range_factor: f64 = map.range_factor,
+        /// Translation, in voxels, from which on the next scan goes into the map.
+        map_min_translation: f64 = map.min_translation,
+        /// Rotation, in radians, likewise.
+        map_min_rotation: f64 = map.min_rotation,
+        /// Largest distance of corresponding points, in root mean squares of the errors of predictions.
+        prediction_max_deviation: f64 = prediction.max_deviation,
+        /// Scans that the expected overlap is taken from.
+        expectation_scans: usize = expectation.scans,
+        /// Share of the expected overlap below which a pose is doubted.
+        doubted_overlap: f64 = expectation.doubted_overlap,
+        /// Overlap of a pose that is believed, at least.
+        min_overlap: f64 = expectation.min_overlap,
+        /// Keyframes that are searched, at most, the latest first.
+        max_keyframes: usize = relocalisation.max_keyframes,
+        /// Matches that agree with a pose that is tried, at least.
+        min_matches: usize = relocalisation.min_matches,
+        /// Scans that must follow each other where the sensor is found again.
+        scans_on_trial: usize = relocalisation.scans_on_trial,
+    }
+}
 
 /// Follows a sensor from scan to scan; see the crate's `Odometry`.
 #[pyclass(module = "surfsig._surfsig")]
@@ -16,15 +59,17 @@ pub struct Odometry {
 #[pymethods]
 impl Odometry {
     #[new]
-    #[pyo3(signature = (*, voxel=None, max_correspondence_distance=None, map_range=None, threads=None))]
+    #[pyo3(signature = (*, voxel=None, max_correspondence_distance=None, map_range=None, settings=None, threads=None))]
     fn new(
         voxel: Option<f64>,
         max_correspondence_distance: Option<f64>,
         map_range: Option<f64>,
+        settings: Option<OdometrySettings>,
         threads: Option<usize>,
     ) -> PyResult<Self> {
+        let settings = settings.map_or_else(surfsig::OdometrySettings::default, |settings| settings.core);
         let settings =
-            OdometrySettings { voxel, max_correspondence_distance, map_range, threads, ..Default::default() };
+            surfsig::OdometrySettings { voxel, max_correspondence_distance, map_range, threads, ..settings };
         Ok(Self { odometry: surfsig::Odometry::new(settings).map_err(to_python)? })
     }
 

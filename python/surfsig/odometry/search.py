@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surfsig import _surfsig
-from surfsig.arguments import positive_length, thread_count
+from surfsig._surfsig import OdometrySettings
+from surfsig.arguments import positive_length, progress_callback, thread_count
 from surfsig.errors import InvalidInputError
 from surfsig.files.sequence import ScanSequence, TimedScan, open_scan_sequence, scan_or_empty
 from surfsig.missing_returns import remove_missing_returns
@@ -33,6 +34,7 @@ def estimate_odometry(
     voxel: float | None = None,
     distance: float | None = None,
     map_range: float | None = None,
+    settings: OdometrySettings | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Odometry:
@@ -59,6 +61,8 @@ def estimate_odometry(
     map_range
         Distance from the sensor up to which the map is kept, in the scans' unit; by default 1.2 times the
         distance within which 99 in 100 points of a scan are.
+    settings
+        For experts; `OdometrySettings` describes what may be changed.
     threads
         Number of threads; all cores by default. The result is the same.
     progress
@@ -92,8 +96,10 @@ def estimate_odometry(
         voxel=length(voxel, "voxel"),
         max_correspondence_distance=length(distance, "distance"),
         map_range=length(map_range, "map_range"),
+        settings=settings,
         threads=thread_count(threads),
     )
+    tell = progress_callback(progress)
     if isinstance(scans, (str, os.PathLike)):
         scans = open_scan_sequence(scans)
     total = len(scans) if isinstance(scans, Sized) else None
@@ -104,8 +110,8 @@ def estimate_odometry(
         missing_returns += len(scan.cloud) - len(cloud)
         odometry.push(cloud.offsets, origin=cloud.origin.tolist(), viewpoint=_viewpoint(cloud))
         timestamps.append(scan.timestamp)
-        if progress is not None:
-            progress(number + 1, number + 1 if total is None else total)
+        if tell is not None:
+            tell(number + 1, number + 1 if total is None else total)
     if not timestamps:
         raise InvalidInputError("there are no scans")
     if missing_returns:
