@@ -118,17 +118,13 @@ fn candidates_of<'a>(
             ModelView::new(&side, Arc::clone(surface), scene.viewpoint, most, settings)
         };
         let proposed = proposed_transforms(&side.places, &places, settings);
+        let [distance, angle] = [settings.same[0] * side.places.radius, settings.same[1]];
         let first = view(&coarse, settings.first_points);
-        let kept = best_first(&first, &proposed, settings.first_distances).take(settings.kept);
-        let kept: Vec<RigidTransform> = kept.collect();
+        let kept = best_first(&first, &proposed, settings.first_distances);
+        let kept = different(kept, settings.kept, distance, angle);
         let second = view(&coarse, settings.coarse_points);
-        let [distance, angle] = settings.same;
-        let tried = different(
-            best_first(&second, &kept, settings.coarse_distances),
-            settings.tried,
-            distance * side.places.radius,
-            angle,
-        );
+        let tried = best_first(&second, &kept, settings.coarse_distances);
+        let tried = different(tried, settings.tried, distance, angle);
         monitor.check()?;
         if tried.is_empty() {
             continue;
