@@ -49,7 +49,7 @@ pub struct FindSettings {
     pub same: [f64; 2],
     /// Points of the scene that an instance is fitted to at last.
     pub max_fitted: usize,
-    /// How it is fitted to them.
+    /// How it is fitted to them: until the start does not matter, as instances are few.
     pub point_to_surface: PointToSurfaceSettings,
     /// Voxels from an instance's surface within which the scene's points are its own.
     pub own_distance: f64,
@@ -92,7 +92,11 @@ impl Default for FindSettings {
             merged_share: 0.5,
             same: [0.25, 0.2],
             max_fitted: 3000,
-            point_to_surface: PointToSurfaceSettings::default(),
+            point_to_surface: PointToSurfaceSettings {
+                epsilon: 1e-5,
+                max_iterations: 15,
+                ..Default::default()
+            },
             own_distance: 1.5,
             contradicted_weight: 5.0,
             missing_weight: 1.0,
