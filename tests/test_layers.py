@@ -44,17 +44,17 @@ PYTHON_EXCEPTIONS = {
 
 RUST_FLOORS = (
     ("error",),
-    ("geometry", "similarity", "point_cloud", "threads", "moments", "monitor", "status"),
+    ("geometry", "similarity", "point_cloud", "random", "threads", "moments", "monitor", "status"),
     ("lattice", "resolution", "depth_image", "visibility", "kd_tree", "voxels"),
     ("simd",),
-    ("cell_index", "surface_index", "tensor", "scan", "neighbor_distances"),
-    ("ball", "curvature"),
+    ("cell_index", "tensor", "scan", "neighbor_distances"),
+    ("ball", "curvature", "spacing"),
     ("block_sums", "fit", "frame"),
     ("members", "shells", "hierarchy"),
     ("extract",),
     ("field", "primitive", "orientation"),
     ("surfaces", "alignment"),
-    ("registration", "odometry"),
+    ("registration", "finding", "odometry"),
 )
 """Modules of the core, the lowest floor first."""
 

@@ -13,7 +13,14 @@ odometry = surfsig.estimate_odometry("scans")  # poses of a moving sensor, by it
 `__version__` is the package's version, `INSTRUCTION_SET` the instructions that its kernels run on here.
 """
 
-from surfsig._surfsig import INSTRUCTION_SET, Frame, OdometrySettings, RegistrationSettings, __version__
+from surfsig._surfsig import (
+    INSTRUCTION_SET,
+    FindSettings,
+    Frame,
+    OdometrySettings,
+    RegistrationSettings,
+    __version__,
+)
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.clean import crop, downsample, remove_outliers
 from surfsig.coordinate_system import CoordinateSystem, GeoKeys
@@ -60,6 +67,7 @@ __all__ = [
     "FieldMatches",
     "FieldSignatures",
     "FileFormatError",
+    "FindSettings",
     "FitUsed",
     "Frame",
     "FreeDirection",

@@ -17,12 +17,12 @@ __all__ = [
     "STATUS_NAMES",
     "DepthImage",
     "E57Reader",
+    "FindSettings",
     "Frame",
     "Odometry",
     "OdometrySettings",
     "Primitive",
     "RegistrationSettings",
-    "SurfaceIndex",
     "SurfacePlaces",
     "__version__",
     "consistent_directions",
@@ -30,11 +30,14 @@ __all__ = [
     "extract",
     "field_keypoints",
     "field_signatures",
+    "find_instances",
     "find_surfaces",
     "fit_primitive",
     "free_directions",
     "match_fields",
     "mean_neighbor_distances",
+    "point_spacing",
+    "prepare_model",
     "register",
     "voxel_representatives",
     "write_e57",
@@ -195,6 +198,128 @@ def register(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> dict[str, Any]: ...
+
+@final
+class FindSettings:
+    """How instances are searched and judged, for experts: what is not given keeps its default.
+
+    The crate's `FindSettings` says why each has its value.
+    """
+
+    def __new__(
+        cls,
+        *,
+        proposals: int | None = None,
+        first_points: int | None = None,
+        first_distances: tuple[float, float, int] | None = None,
+        kept: int | None = None,
+        coarse_points: int | None = None,
+        coarse_distances: tuple[float, float, int] | None = None,
+        coarse_voxels: float | None = None,
+        tried: int | None = None,
+        aligned_points: int | None = None,
+        fine_points: int | None = None,
+        fine_distances: tuple[float, float, int] | None = None,
+        spacings_per_voxel: float | None = None,
+        noises_per_voxel: float | None = None,
+        agreement: Sequence[float] | None = None,
+        merged_share: float | None = None,
+        same: Sequence[float] | None = None,
+        max_fitted: int | None = None,
+        own_distance: float | None = None,
+        contradicted_weight: float | None = None,
+        missing_weight: float | None = None,
+        unknown_free_space_weight: float | None = None,
+        round_spread: float | None = None,
+        touching_distance: float | None = None,
+        agreement_by_chance: Sequence[float] | None = None,
+    ) -> FindSettings: ...
+    @property
+    def proposals(self) -> int:
+        """Proposed transforms that are judged by few points."""
+    @property
+    def first_points(self) -> int:
+        """Points of the model in that first judgement."""
+    @property
+    def first_distances(self) -> tuple[float, float, int]:
+        """Voxels between correspondences in the steps of its alignment: from, to, how many."""
+    @property
+    def kept(self) -> int:
+        """Proposals that are judged by more points."""
+    @property
+    def coarse_points(self) -> int:
+        """Points of the model in that second judgement."""
+    @property
+    def coarse_distances(self) -> tuple[float, float, int]:
+        """Voxels between correspondences in the steps of its alignment."""
+    @property
+    def coarse_voxels(self) -> float:
+        """Voxels of both judgements, in those of the last."""
+    @property
+    def tried(self) -> int:
+        """Transforms that are aligned and judged by most points."""
+    @property
+    def aligned_points(self) -> int:
+        """Points of the model in their alignment."""
+    @property
+    def fine_points(self) -> int:
+        """Points of the model in their judgement."""
+    @property
+    def fine_distances(self) -> tuple[float, float, int]:
+        """Voxels between correspondences in its steps."""
+    @property
+    def spacings_per_voxel(self) -> float:
+        """Distance between points of the surface, in the scene's point spacings at least."""
+    @property
+    def noises_per_voxel(self) -> float:
+        """The same in the scene's noise."""
+    @property
+    def agreement(self) -> list[float]:
+        """Patch radii, and radians, within which two proposed transforms agree."""
+    @property
+    def merged_share(self) -> float:
+        """Of these, between two proposals of which the less agreed one is left out."""
+    @property
+    def same(self) -> list[float]:
+        """Patch radii, and radians, within which two aligned transforms are the same."""
+    @property
+    def max_fitted(self) -> int:
+        """Points of the scene that an instance is fitted to, at most."""
+    @property
+    def own_distance(self) -> float:
+        """Voxels from an instance's surface within which the scene's points are its own."""
+    @property
+    def contradicted_weight(self) -> float:
+        """What a point that the sensor saw through counts, in confirmed ones."""
+    @property
+    def missing_weight(self) -> float:
+        """The same of one where the sensor saw nothing."""
+    @property
+    def unknown_free_space_weight(self) -> float:
+        """What a confirmed point counts where nobody knows what the sensor saw through."""
+    @property
+    def round_spread(self) -> float:
+        """Spread of confirmed normals from which on they are more than a plane."""
+    @property
+    def touching_distance(self) -> float:
+        """Voxels from the scene's next point within which a point of the model lies on the scene."""
+    @property
+    def agreement_by_chance(self) -> list[float]:
+        """Mean agreement of touching surfaces that is reached by chance, and by equal ones."""
+    def __eq__(self, other: object) -> bool: ...
+
+def prepare_model(scan: _Scan, *, threads: int | None = None) -> dict[str, Any]: ...
+def find_instances(
+    models: Sequence[tuple[Any, ...]],
+    scene: _Scan,
+    *,
+    min_score: float,
+    free_space_viewpoint: list[float] | None = None,
+    settings: FindSettings | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> list[dict[str, Any]]: ...
+def point_spacing(points: NDArray[np.float64]) -> float: ...
 def free_directions(
     points: NDArray[np.float64], normals: NDArray[np.float64]
 ) -> list[tuple[Literal["rotation", "translation"], list[float] | None, list[float] | None]]: ...
@@ -237,20 +362,6 @@ def write_e57(
 @final
 class SurfacePlaces:
     def __new__(cls, places: NDArray[np.float32], normals: NDArray[np.float32]) -> SurfacePlaces: ...
-
-@final
-class SurfaceIndex:
-    def __new__(cls, places: SurfacePlaces, cell: float) -> SurfaceIndex: ...
-    def partners(
-        self, poses: NDArray[np.float64], places: SurfacePlaces, reach: float
-    ) -> NDArray[np.int64]: ...
-    def settle(
-        self,
-        poses: NDArray[np.float64],
-        places: SurfacePlaces,
-        reaches: NDArray[np.float32],
-        threads: int | None = None,
-    ) -> NDArray[np.float64]: ...
 
 @final
 class DepthImage:

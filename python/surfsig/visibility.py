@@ -79,13 +79,23 @@ def hidden_from(direction: Array, places: Array, points: Array, spacing: float) 
     across = np.linalg.svd(direction[None])[2][1:]
     if not len(places):
         return np.zeros(0, np.bool_)
-    cells = [np.floor(part @ across.T / (_CELL * spacing)).astype(np.int64) for part in (points, places)]
+    of_points = _cells_across(points, across, _CELL * spacing)
+    of_places = of_points if places is points else _cells_across(places, across, _CELL * spacing)
+    cells = (of_points, of_places)
     low = np.minimum(cells[0].min(axis=0), cells[1].min(axis=0))
     width = int(max(cells[0][:, 1].max(), cells[1][:, 1].max()) - low[1] + 1)
     taken, asked = ((cell - low) @ [width, 1] for cell in cells)
     front = np.full(int(max(taken.max(), asked.max())) + 1, -np.inf)
     np.maximum.at(front, taken, points @ direction)
     return np.asarray(front[asked] > places @ direction + _MARGIN * spacing)
+
+
+def _cells_across(points: Array, across: Array, edge: float) -> NDArray[np.int64]:
+    """Give the squares (n, 2) of an edge that points (n, 3) are in, along two axes (2, 3)."""
+    # Column by column: a product with so few columns takes ten times as long.
+    x, y, z = points.T
+    columns = [np.floor((x * axis[0] + y * axis[1] + z * axis[2]) / edge) for axis in across]
+    return np.column_stack(columns).astype(np.int64)
 
 
 def seen_from(viewpoint: Array, points: Array, spacing: float) -> bool:

@@ -9,7 +9,7 @@ use surfsig::{Judgement, RigidTransform, SurfacePlace};
 /// Places on a surface with unit normals, (n, 3) each, float32.
 #[pyclass(frozen, module = "surfsig")]
 pub struct SurfacePlaces {
-    pub(crate) places: Vec<SurfacePlace>,
+    places: Vec<SurfacePlace>,
 }
 
 #[pymethods]
@@ -99,7 +99,7 @@ impl DepthImage {
 }
 
 /// The transforms of an (n, 4, 4) array that stands row by row in memory.
-pub(crate) fn poses_of(poses: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<RigidTransform>> {
+fn poses_of(poses: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<RigidTransform>> {
     if !poses.is_c_contiguous() || poses.shape()[1..] != [4, 4] {
         return Err(invalid_input("expected a C-contiguous array of shape (n, 4, 4)"));
     }

@@ -125,7 +125,7 @@ pub struct PlacesArgument<'py>(
 );
 
 impl PlacesArgument<'_> {
-    fn places(&self) -> PyResult<FieldPlaces> {
+    pub fn places(&self) -> PyResult<FieldPlaces> {
         const PHASES: usize = 14 * FIELD_PHASES;
         let phases = rows::<f32, PHASES>(&self.4)?.as_flattened().as_chunks::<2>().0;
         let orders = phases.as_chunks::<FIELD_PHASES>().0.as_chunks::<7>().0;
@@ -173,7 +173,7 @@ pub fn match_fields<'py>(
 }
 
 /// As many rows as there are places.
-fn table(py: Python<'_>, values: Vec<f32>, count: usize) -> PyResult<Bound<'_, PyAny>> {
+pub fn table(py: Python<'_>, values: Vec<f32>, count: usize) -> PyResult<Bound<'_, PyAny>> {
     let width = values.len() / count.max(1);
     Ok(PyArray1::from_vec(py, values).reshape([count, width])?.into_any())
 }

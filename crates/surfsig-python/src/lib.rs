@@ -4,6 +4,7 @@ mod depth_image;
 mod e57;
 mod extract;
 mod field;
+mod finding;
 mod frame;
 mod neighbor_distances;
 mod odometry;
@@ -11,7 +12,6 @@ mod primitive;
 mod python_file;
 mod registration;
 mod settings;
-mod surface_index;
 mod surfaces;
 
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
@@ -65,6 +65,8 @@ mod _surfsig {
     #[pymodule_export]
     use crate::field::{field_keypoints, field_signatures, match_fields};
     #[pymodule_export]
+    use crate::finding::{FindSettings, find_instances, point_spacing, prepare_model};
+    #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]
     use crate::neighbor_distances::mean_neighbor_distances;
@@ -74,8 +76,6 @@ mod _surfsig {
     use crate::primitive::{Primitive, fit_primitive};
     #[pymodule_export]
     use crate::registration::{RegistrationSettings, consistent_directions, free_directions, register};
-    #[pymodule_export]
-    use crate::surface_index::SurfaceIndex;
     #[pymodule_export]
     use crate::surfaces::find_surfaces;
 

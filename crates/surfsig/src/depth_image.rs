@@ -10,11 +10,11 @@ const REACH: i32 = 2;
 /// Squared pixels from the next point of the scan up to which something may have been measured.
 const LOST: i32 = 6;
 /// Cosine between normals that face alike; those of narrow surfaces and of edges are smoothed.
-const ALIKE: f32 = 0.8;
+pub(crate) const ALIKE: f32 = 0.8;
 /// Tolerances from the surface within which another surface would have been told from it.
 const BESIDE: f32 = 4.0;
 /// Cosine to the line of sight from which on a surface is not too steep to be measured (65 degrees).
-const FACING: f32 = 0.42;
+pub(crate) const FACING: f32 = 0.42;
 
 /// A place on a surface, with the unit normal on the sensor's side.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,8 +53,8 @@ enum Seen {
 
 #[derive(Debug, Clone, Copy)]
 struct Pixel {
-    /// The nearest point of the scan, in the image's axes.
-    at: SurfacePlace,
+    /// The number of the nearest point of the scan.
+    point: u32,
     /// The smallest depth in the 3 x 3 pixels around; below all where no point is in the pixel itself, as in
     /// shadows and along rims too steep to be measured.
     front: f32,
@@ -87,6 +87,8 @@ pub struct DepthImage {
     /// Pixels per unit of slope.
     scale: f32,
     side: usize,
+    /// Of the scan, in the image's axes.
+    points: Vec<SurfacePlace>,
     pixels: Vec<Pixel>,
     second: Option<Box<DepthImage>>,
     /// In the image's axes.
@@ -119,6 +121,7 @@ impl DepthImage {
             distance: distance as f32,
             scale: (distance / pixel) as f32,
             side,
+            points: Vec::new(),
             pixels: Vec::new(),
             second: second.map(|other| Box::new(Self::new(points, own, other, spacing, reach, None))),
             floors: Vec::new(),
@@ -136,41 +139,48 @@ impl DepthImage {
 
     fn fill(&mut self, points: &[SurfacePlace], own: &[bool]) {
         let side = self.side;
-        let mut nearest = vec![None::<(f32, u32)>; side * side];
-        let turned: Vec<_> = points.iter().map(|point| self.turned(point)).collect();
-        for (number, point) in turned.iter().enumerate() {
+        self.points = points.iter().map(|point| self.turned(point)).collect();
+        let mut depths = vec![f32::INFINITY; side * side];
+        let mut numbers = vec![0_u32; side * side];
+        for (number, point) in (0..).zip(&self.points) {
             if let Some((cell, depth)) = self.project(&point.place)
-                && nearest[cell].is_none_or(|(other, _)| depth < other)
+                && depth < depths[cell]
             {
-                nearest[cell] = Some((depth, number as u32));
+                (depths[cell], numbers[cell]) = (depth, number);
             }
         }
-        let around = |cell: usize, squared: i32| {
+        let fronts = smallest_around(&depths, side, 1);
+        let nearby = smallest_around(&depths, side, 2);
+        let mut steps: Vec<(i32, i32, i32)> =
+            (-2..=2).flat_map(|dy| (-2..=2).map(move |dx| (dy * dy + dx * dx, dy, dx))).collect();
+        steps.retain(|&(squared, ..)| 0 < squared && squared <= LOST);
+        steps.sort_unstable();
+        let nearest = |cell: usize| {
             let (row, column) = ((cell / side) as i32, (cell % side) as i32);
-            let inside = move |(y, x): (i32, i32)| y.min(x) >= 0 && y.max(x) < side as i32;
-            let steps = (-2..=2).flat_map(|dy| (-2..=2).map(move |dx| (dy, dx)));
-            steps
-                .filter(move |(dy, dx)| dy * dy + dx * dx <= squared)
-                .map(move |(dy, dx)| (dy * dy + dx * dx, (row + dy, column + dx)))
-                .filter(move |&(_, place)| inside(place))
-                .map(move |(apart, (y, x))| (apart, y as usize * side + x as usize))
+            let inside = |x: i32| x >= 0 && x < side as i32;
+            let found = steps.iter().filter(|(_, dy, dx)| inside(row + dy) && inside(column + dx));
+            let mut found = found.map(|&(squared, dy, dx)| (squared, (row + dy) * side as i32 + column + dx));
+            found.find(|&(_, other)| depths[other as usize] < f32::INFINITY)
         };
-        let nothing = SurfacePlace { place: [0.0; 3], normal: [0.0; 3] };
         let pixel = |cell: usize| {
-            let found = around(cell, LOST).filter_map(|(apart, other)| Some((apart, nearest[other]?)));
-            let Some((apart, (_, number))) = found.min_by_key(|(apart, _)| *apart) else {
-                return Pixel { at: nothing, front: f32::NEG_INFINITY, seen: Seen::Nothing };
-            };
-            let depths = around(cell, 2).filter_map(|(_, other)| nearest[other]).map(|(depth, _)| depth);
-            let seen = match (apart <= REACH, own[number as usize]) {
-                (false, _) => Seen::Between,
-                (true, true) => Seen::Own,
-                (true, false) => Seen::Other,
-            };
-            let front = if apart == 0 { depths.fold(f32::INFINITY, f32::min) } else { f32::NEG_INFINITY };
-            Pixel { at: turned[number as usize], front, seen }
+            let seen_by = |point: u32| if own[point as usize] { Seen::Own } else { Seen::Other };
+            let nothing = Pixel { point: 0, front: f32::NEG_INFINITY, seen: Seen::Nothing };
+            if depths[cell] < f32::INFINITY {
+                return Pixel { point: numbers[cell], front: fronts[cell], seen: seen_by(numbers[cell]) };
+            }
+            if nearby[cell] == f32::INFINITY {
+                return nothing;
+            }
+            let Some((squared, other)) = nearest(cell) else { return nothing };
+            let point = numbers[other as usize];
+            let seen = if squared <= REACH { seen_by(point) } else { Seen::Between };
+            Pixel { point, seen, ..nothing }
         };
         self.pixels = (0..side * side).map(pixel).collect();
+    }
+
+    fn at(&self, pixel: &Pixel) -> &SurfacePlace {
+        &self.points[pixel.point as usize]
     }
 
     /// Tells what the scan says about surface places that a pose moves into it.
@@ -195,10 +205,10 @@ impl DepthImage {
                 }
                 seen => {
                     let own = seen == Seen::Own;
-                    let height = height_over(&pixel.at, &place).abs();
+                    let height = height_over(self.at(pixel), &place).abs();
                     if own && height <= tolerance {
                         let normal = moved(&turn, &[0.0; 3], &point.normal);
-                        if dot(&normal, &pixel.at.normal) > ALIKE {
+                        if dot(&normal, &self.at(pixel).normal) > ALIKE {
                             counts[0] += 1;
                             // On the surface, however its rim lies before it.
                             counts[1] += u32::from(depth < pixel.front - 2.0 * tolerance);
@@ -242,11 +252,11 @@ impl DepthImage {
             let pixel = &self.pixels[self.project(&place)?.0];
             let normal = moved(&turn, &[0.0; 3], &point.normal);
             let near = pixel.seen == Seen::Own
-                && height_over(&pixel.at, &place).abs() <= BESIDE * tolerance
-                && dot(&normal, &pixel.at.normal) > ALIKE;
+                && height_over(self.at(pixel), &place).abs() <= BESIDE * tolerance
+                && dot(&normal, &self.at(pixel).normal) > ALIKE;
             near.then(|| SurfacePlace {
-                place: self.turned_back(&pixel.at.place),
-                normal: self.turned_back(&pixel.at.normal),
+                place: self.turned_back(&self.at(pixel).place),
+                normal: self.turned_back(&self.at(pixel).normal),
             })
         };
         places.iter().map(found).collect()
@@ -273,8 +283,10 @@ impl DepthImage {
     fn hides(&self, place: &[f32; 3], tolerance: f32) -> bool {
         self.project(place).is_some_and(|(cell, depth)| {
             let pixel = &self.pixels[cell];
-            let behind = depth - self.distance - pixel.at.place[2];
-            pixel.seen != Seen::Nothing && behind.min(-height_over(&pixel.at, place)) > 2.0 * tolerance
+            pixel.seen != Seen::Nothing && {
+                let behind = depth - self.distance - self.at(pixel).place[2];
+                behind.min(-height_over(self.at(pixel), place)) > 2.0 * tolerance
+            }
         })
     }
 
@@ -306,6 +318,24 @@ impl DepthImage {
     }
 }
 
+/// Of each pixel the smallest value in a square of pixels around it, which reaches `reach` pixels to each side.
+fn smallest_around(values: &[f32], side: usize, reach: usize) -> Vec<f32> {
+    let mut of_rows = values.to_vec();
+    let rows = of_rows.chunks_exact_mut(side).zip(values.chunks_exact(side));
+    for (smallest, row) in rows {
+        for step in 1..=reach.min(side - 1) {
+            smallest[step..].iter_mut().zip(row).for_each(|(least, &other)| *least = least.min(other));
+            smallest.iter_mut().zip(&row[step..]).for_each(|(least, &other)| *least = least.min(other));
+        }
+    }
+    let mut of_all = of_rows.clone();
+    for step in (1..=reach.min(side - 1)).map(|rows| rows * side) {
+        of_all[step..].iter_mut().zip(&of_rows).for_each(|(least, &other)| *least = least.min(other));
+        of_all.iter_mut().zip(&of_rows[step..]).for_each(|(least, &other)| *least = least.min(other));
+    }
+    of_all
+}
+
 /// Three axes square to each other, the last one along a unit vector.
 fn axes_towards(forward: [f64; 3]) -> [[f32; 3]; 3] {
     let forward = Vector3::from(forward);
@@ -327,75 +357,4 @@ fn height_over(at: &SurfacePlace, place: &[f32; 3]) -> f32 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const UP: [f32; 3] = [0.0, 0.0, 1.0];
-    const FAR_ABOVE: [f64; 3] = [0.0, 0.0, 1e4];
-
-    fn at(x: f32, y: f32, z: f32) -> SurfacePlace {
-        SurfacePlace { place: [x, y, z], normal: UP }
-    }
-
-    fn board(columns: std::ops::Range<i32>, rows: std::ops::Range<i32>, z: f32) -> Vec<SurfacePlace> {
-        let row = |y: i32| columns.clone().map(move |x| at(x as f32, y as f32, z));
-        rows.flat_map(row).collect()
-    }
-
-    /// A square of 21 before a wall, with a strip from x = 16 to 22 where nothing was measured.
-    fn image(second: Option<[f64; 3]>) -> DepthImage {
-        let square = board(-10..11, -10..11, 0.0);
-        let mut points = board(-30..31, -30..31, -10.0);
-        points.retain(|point| point.place[0] < 16.0 || point.place[0] > 22.0);
-        let own: Vec<bool> = (0..square.len() + points.len()).map(|number| number < square.len()).collect();
-        DepthImage::new(&[square, points].concat(), &own, FAR_ABOVE, 1.0, 30.0, second)
-    }
-
-    fn judged(image: &DepthImage, point: SurfacePlace) -> [f32; 4] {
-        let found = image.judge(&RigidTransform::identity(), &[point], 0.3);
-        [found.confirmed, found.contradicted, found.astray, found.missing]
-    }
-
-    #[test]
-    fn what_is_on_hidden_through_and_missing() {
-        let image = image(None);
-        assert_eq!(judged(&image, at(5.0, 5.0, 0.1)), [1.0, 0.0, 0.0, 0.0]);
-        assert_eq!(judged(&image, at(5.0, 5.0, -1.0)), [0.0, 0.0, 1.0, 0.0]);
-        assert_eq!(judged(&image, at(5.0, 5.0, -8.0)), [0.0; 4]);
-        assert_eq!(judged(&image, at(-20.0, 5.0, -2.0)), [0.0, 1.0, 0.0, 0.0]);
-        assert_eq!(judged(&image, at(19.0, 0.0, 0.0)), [0.0, 0.0, 0.0, 1.0]);
-    }
-
-    #[test]
-    fn what_turns_its_back_is_neither_confirmed_nor_missing() {
-        let away = |x| SurfacePlace { place: [x, 5.0, 0.0], normal: [0.0, 0.0, -1.0] };
-        assert_eq!(judged(&image(None), away(5.0)), [0.0, 0.0, 1.0, 0.0]);
-        assert_eq!(judged(&image(None), away(19.0)), [0.0; 4]);
-    }
-
-    #[test]
-    fn nothing_is_missing_where_a_second_place_could_not_see() {
-        // Seen from the left at 45 degrees, the square hides what is 9 behind its plane and 19 to the right.
-        let beside = image(Some([-1e4, 0.0, 1e4]));
-        assert_eq!(judged(&beside, at(19.0, 0.0, -15.0))[3], 0.0);
-        assert_eq!(judged(&beside, at(19.0, 0.0, 0.0))[3], 1.0);
-    }
-
-    #[test]
-    fn nothing_is_beneath_the_floor() {
-        let standing = image(None).standing_on(&[at(0.0, 0.0, -5.0)]);
-        assert_eq!(judged(&standing, at(5.0, 5.0, -8.0)), [0.0, 1.0, 0.0, 0.0]);
-        assert_eq!(judged(&standing, at(5.0, 5.0, -4.0)), [0.0; 4]);
-    }
-
-    #[test]
-    fn correspondences_are_the_points_there_in_the_axes_of_the_scan() {
-        let image = image(None);
-        let pose = RigidTransform::from_rotation_vector([0.0; 3], [3.0, 0.0, 0.0]);
-        let found = image.correspondences(&pose, &[at(0.2, 4.1, 0.1), at(12.0, 4.0, 0.1)], 0.3);
-        let near = found[0].expect("on the square");
-        let apart = |a: [f32; 3], b: [f32; 3]| (0..3).map(|i| (a[i] - b[i]).abs()).fold(0.0, f32::max);
-        assert!(apart(near.place, [3.0, 4.0, 0.0]) <= 1.0 && apart(near.normal, UP) < 1e-6);
-        assert_eq!(found[1], None);
-    }
-}
+mod tests;

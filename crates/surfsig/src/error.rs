@@ -78,6 +78,9 @@ pub enum Error {
         /// Largest singular value of F, patch units.
         largest: f64,
     },
+    /// What is looked for is no model: its text says why.
+    #[error("{0}")]
+    InvalidModel(String),
     /// The caller asked to stop.
     #[error("stopped by the caller")]
     Cancelled,

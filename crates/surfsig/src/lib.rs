@@ -39,6 +39,7 @@ mod depth_image;
 mod error;
 mod extract;
 mod field;
+mod finding;
 mod fit;
 mod frame;
 mod geometry;
@@ -53,14 +54,15 @@ mod odometry;
 mod orientation;
 mod point_cloud;
 mod primitive;
+mod random;
 mod registration;
 mod resolution;
 mod scan;
 mod shells;
 mod simd;
 mod similarity;
+mod spacing;
 mod status;
-mod surface_index;
 mod surfaces;
 mod tensor;
 mod threads;
@@ -84,6 +86,7 @@ pub use field::{
     FieldSignature, KeypointOptions, field_distinctiveness, field_pools, field_signatures, find_keypoints,
     match_fields,
 };
+pub use finding::{FIND_STEPS_PER_MODEL, FindSettings, Instance, Model, find_instances};
 pub use fit::{
     Cylinder, FitAxes, FitKind, FitUsed, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere,
 };
@@ -105,8 +108,8 @@ pub use resolution::{COARSEST_STEP, Resolution};
 pub use scan::Scan;
 pub use simd::InstructionSet;
 pub use similarity::{GOOD, OPTIMAL, SimilarityClass, similarity};
+pub use spacing::point_spacing;
 pub use status::Status;
-pub use surface_index::SurfaceIndex;
 pub use surfaces::{FEWEST_SURFACE_POINTS, FoundSurface, FoundSurfaces, SurfaceOptions, find_surfaces};
 pub use threads::with_threads;
 pub use visibility::{RangeImageSettings, SphericalRangeImage, Visibility};

@@ -69,6 +69,8 @@ const FARTHEST: f64 = 1e70;
 #[derive(Debug, Clone)]
 pub(crate) struct CenteredScan {
     pub points: Vec<[f64; 3]>,
+    /// Numbers of the points in the scan that was given; none after thinning.
+    pub numbers: Vec<usize>,
     /// In the scan's coordinates: the median of each coordinate.
     pub center: [f64; 3],
     /// About the centre, as the points.
@@ -88,6 +90,7 @@ impl CenteredScan {
         let near = || finite.iter().filter(|(_, point)| is_near(*point));
         Self {
             points: near().map(|(_, point)| about(*point)).collect(),
+            numbers: near().map(|(i, _)| *i).collect(),
             center,
             viewpoint: scan.viewpoint.map(about),
             directions: scan.directions.map(|all| near().map(|(i, _)| all[*i]).collect()),
@@ -110,7 +113,23 @@ impl CenteredScan {
             };
             voxels.sums(directions.iter().map(unit)).into_iter().map(|sum| sum.map(|x| x as f32)).collect()
         };
-        Self { points: voxels.means(&self.points), directions: self.directions.as_ref().map(sum_of), ..*self }
+        Self {
+            points: voxels.means(&self.points),
+            numbers: Vec::new(),
+            directions: self.directions.as_ref().map(sum_of),
+            ..*self
+        }
+    }
+
+    /// Those of the points that are wanted.
+    pub fn some(&self, is_wanted: impl Fn(&[f64; 3]) -> bool) -> Self {
+        let chosen: Vec<usize> = (0..self.points.len()).filter(|&i| is_wanted(&self.points[i])).collect();
+        Self {
+            points: chosen.iter().map(|&i| self.points[i]).collect(),
+            numbers: chosen.iter().filter_map(|&i| self.numbers.get(i).copied()).collect(),
+            directions: self.directions.as_ref().map(|all| chosen.iter().map(|&i| all[i]).collect()),
+            ..*self
+        }
     }
 
     pub fn scan(&self) -> Scan<'_> {

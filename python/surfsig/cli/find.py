@@ -76,7 +76,8 @@ def find_command(
     shown = on_terminal() and not quiet
     with progress_bar("reading", "bytes", shown=shown) as progress:
         scene = surfsig.read(scene_file, progress=progress, **reading)
-    found = surfsig.find_instances(model, scene, score=score, threads=threads)
+    with progress_bar("finding", "steps", shown=shown) as progress:
+        found = surfsig.find_instances(model, scene, score=score, threads=threads, progress=progress)
     if output is not None:
         with progress_bar("writing", "points", shown=shown) as progress:
             surfsig.write(output, scene, {"instance": found.labels}, progress=progress)

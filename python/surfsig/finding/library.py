@@ -126,7 +126,7 @@ class Library:
         entry = LibraryEntry(name, added, unit, len(prepared.points), prepared.radius)
         with self._opened(create=True) as store:
             verb = "INSERT OR REPLACE" if replace else "INSERT"
-            row = (*entry, prepared.spacing, prepared.sided, size, packed)
+            row = (*entry, prepared.spacing, prepared.is_sided, size, packed)
             try:
                 store.execute(f"{verb} INTO models VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
             except sqlite3.IntegrityError:
@@ -201,7 +201,7 @@ class Library:
             If the file is damaged.
         """
         model = stored_model(self, name)
-        return PointCloud(model.points, origin=model.middle)
+        return PointCloud(model.points, origin=model.center)
 
     @contextmanager
     def _opened(self, create: bool = False) -> Iterator[sqlite3.Connection]:
@@ -256,8 +256,8 @@ def stored_model(library: Library, name: str) -> Model:
 def _packed(model: Model) -> tuple[bytes, int]:
     arrays: dict[str, NDArray[Any]] = {
         "points": model.points,
-        "middle": model.middle,
-        "places": model.places,
+        "middle": model.center,
+        "places": model.samples,
         "normals": model.normals,
     }
     arrays |= {f"signature_{name}": getattr(model.signatures, name) for name in _SIGNATURES}
@@ -280,5 +280,5 @@ def _unpacked(radius: float, spacing: float, sided: int, size: int, packed: byte
             **{name: arrays[f"signature_{name}"] for name in _SIGNATURES},
         )
         whole = (arrays[name] for name in ("points", "middle", "places", "normals"))
-        points, middle, places, normals = whole
-    return Model(points, middle, spacing, radius, places, normals, signatures, bool(sided))
+        points, center, samples, normals = whole
+    return Model(points, center, spacing, radius, samples, normals, signatures, bool(sided))

@@ -1,6 +1,7 @@
 //! Some points of a surface, spread evenly over it however dense its parts are.
 
 use crate::kd_tree::KdTree;
+use crate::random::uniform;
 use crate::voxels::Voxels;
 use rayon::prelude::*;
 
@@ -53,15 +54,6 @@ fn smallest(numbers: Vec<usize>, count: usize, key: impl Fn(usize) -> f64) -> Ve
     chosen
 }
 
-/// A number above 0 and at most 1 for each of a stream's draws (SplitMix64: Steele, Lea, Flood, Fast splittable
-/// pseudorandom number generators, 2014).
-pub(super) fn uniform(draw: usize, stream: u64) -> f64 {
-    let mut z = (draw as u64).wrapping_add(stream << 40).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 + f64::EPSILON / 4.0
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -88,15 +80,5 @@ mod tests {
         assert_eq!(even_sample(&[[1.0; 3]; 5], 10, 0.1).len(), 5);
         assert_eq!(even_sample(&[[1.0; 3]; 50], 10, 0.1).len(), 10);
         assert_eq!(even_sample(&[], 10, 0.1).len(), 0);
-    }
-
-    #[test]
-    fn draws_are_uniform() {
-        let draws: Vec<f64> = (0..10_000).map(|i| uniform(i, 1)).collect();
-        assert!(draws.iter().all(|&u| u > 0.0 && u <= 1.0));
-        for tenth in 0..10 {
-            let inside = draws.iter().filter(|&&u| (u * 10.0).ceil() as usize == tenth + 1).count();
-            assert!((900..1100).contains(&inside), "{tenth}: {inside}");
-        }
     }
 }

@@ -1,7 +1,8 @@
 //! What registration, finding, odometry and recurrences share: how one surface lies on another, and how sure that is.
 //!
 //! Matches propose a transform ([`consensus`]), distributions refine it ([`gicp`]), points fit it to the surface
-//! ([`point_to_surface`]), and [`observability`] tells in which directions nothing determines it.
+//! ([`point_to_surface`]), many at once are fitted to tangent planes ([`point_to_plane`]), and [`observability`] tells in
+//! which directions nothing determines it.
 
 mod clustered_covariance;
 mod consensus;
@@ -9,6 +10,7 @@ mod even_sample;
 mod gicp;
 mod least_squares;
 mod observability;
+mod point_to_plane;
 mod point_to_surface;
 
 pub(crate) use clustered_covariance::{blocks, clustered_covariance};
@@ -19,5 +21,6 @@ pub use gicp::{GicpCloud, GicpResult, GicpSettings, gicp};
 pub(crate) use gicp::{GicpTarget, gicp_with, plane_of};
 pub(crate) use least_squares::solve_determined;
 pub use observability::{FreeDirection, free_directions};
+pub(crate) use point_to_plane::{FACING_AWAY, OrientedSurface, cosine_towards, transformed};
 pub use point_to_surface::PointToSurfaceSettings;
-pub(crate) use point_to_surface::TargetSurface;
+pub(crate) use point_to_surface::{PointToSurface, TargetSurface};

@@ -329,7 +329,7 @@ mod tests {
 
     /// From -1 to 1.
     fn number(i: usize) -> f64 {
-        2.0 * super::super::even_sample::uniform(i, 2) - 1.0
+        2.0 * crate::random::uniform(i, 2) - 1.0
     }
 
     /// Points of a hilly terrain of 40 x 40 voxels, each off it by a normally distributed error.

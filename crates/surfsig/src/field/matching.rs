@@ -8,9 +8,18 @@ use crate::simd::products::{COLUMNS, Panel, ROWS, products};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 /// Angles about the axis that are tried; the best one lies between two of them.
 const ANGLES: usize = 128;
+
+/// Cosine and sine of each of them.
+static CIRCLE: LazyLock<[[f64; 2]; ANGLES]> = LazyLock::new(|| {
+    std::array::from_fn(|step| {
+        let angle = TAU / ANGLES as f64 * step as f64;
+        [angle.cos(), angle.sin()]
+    })
+});
 
 /// A place of a source and the place of a target that it is most like.
 ///
@@ -109,11 +118,12 @@ fn rotation_about_axis(source: &FieldPhases, target: &FieldPhases) -> f64 {
             sum[1] += a * d - b * c;
         }
     }
+    // Dereferenced once, not for each angle.
+    let circle: &[[f64; 2]; ANGLES] = &CIRCLE;
     let score = |step: usize| {
         let waves = agreement.iter().zip(1..).map(|([real, imaginary], order)| {
-            // Whole steps of the circle: the angle is reduced before it loses digits.
-            let angle = TAU / ANGLES as f64 * (order * step % ANGLES) as f64;
-            real * angle.cos() + imaginary * angle.sin()
+            let [cosine, sine] = circle[order * step % ANGLES];
+            real * cosine + imaginary * sine
         });
         waves.sum::<f64>()
     };

@@ -1,0 +1,191 @@
+//! Instances of models, for Python.
+
+use crate::extract::watched;
+use crate::field::{PlacesArgument, table};
+use crate::registration::{ScanArgument, free_directions_to_python};
+use crate::rows;
+use crate::settings::settings_class;
+use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2, ToPyArray};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use surfsig::{FIND_STEPS_PER_MODEL, FieldPlaces, Instance, Model, Monitor};
+
+settings_class! {
+    /// How instances are searched and judged, for experts; see `surfsig.find_instances`.
+    FindSettings of surfsig::FindSettings {
+        /// Proposed transforms that are judged by few points.
+        proposals: usize = proposals,
+        /// Points of the model in that first judgement.
+        first_points: usize = first_points,
+        /// Voxels between correspondences in the steps of its alignment: from, to, how many.
+        first_distances: (f64, f64, usize) = first_distances,
+        /// Proposals that are judged by more points.
+        kept: usize = kept,
+        /// Points of the model in that second judgement.
+        coarse_points: usize = coarse_points,
+        /// Voxels between correspondences in the steps of its alignment.
+        coarse_distances: (f64, f64, usize) = coarse_distances,
+        /// Voxels of both judgements, in those of the last.
+        coarse_voxels: f64 = coarse_voxels,
+        /// Transforms that are aligned and judged by most points.
+        tried: usize = tried,
+        /// Points of the model in their alignment.
+        aligned_points: usize = aligned_points,
+        /// Points of the model in their judgement.
+        fine_points: usize = fine_points,
+        /// Voxels between correspondences in its steps.
+        fine_distances: (f64, f64, usize) = fine_distances,
+        /// Distance between points of the surface, in the scene's point spacings at least.
+        spacings_per_voxel: f64 = spacings_per_voxel,
+        /// The same in the scene's noise.
+        noises_per_voxel: f64 = noises_per_voxel,
+        /// Patch radii, and radians, within which two proposed transforms agree.
+        agreement: [f64; 2] = agreement,
+        /// Of these, between two proposals of which the less agreed one is left out.
+        merged_share: f64 = merged_share,
+        /// Patch radii, and radians, within which two aligned transforms are the same.
+        same: [f64; 2] = same,
+        /// Points of the scene that an instance is fitted to, at most.
+        max_fitted: usize = max_fitted,
+        /// Voxels from an instance's surface within which the scene's points are its own.
+        own_distance: f64 = own_distance,
+        /// What a point that the sensor saw through counts, in confirmed ones.
+        contradicted_weight: f64 = contradicted_weight,
+        /// The same of one where the sensor saw nothing.
+        missing_weight: f64 = missing_weight,
+        /// What a confirmed point counts where nobody knows what the sensor saw through.
+        unknown_free_space_weight: f64 = unknown_free_space_weight,
+        /// Spread of confirmed normals from which on they are more than a plane.
+        round_spread: f64 = round_spread,
+        /// Voxels from the scene's next point within which a point of the model lies on the scene.
+        touching_distance: f64 = touching_distance,
+        /// Mean agreement of touching surfaces that is reached by chance, and by equal ones.
+        agreement_by_chance: [f64; 2] = agreement_by_chance,
+    }
+}
+
+/// Points (n, 3), their centre, spacing, radius of the patches, samples and normals (m, 3), places with signatures, and
+/// whether the outer side is known.
+#[derive(FromPyObject)]
+pub struct ModelArgument<'py>(
+    PyReadonlyArray2<'py, f64>,
+    [f64; 3],
+    f64,
+    f64,
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray2<'py, f64>,
+    PlacesArgument<'py>,
+    bool,
+);
+
+impl ModelArgument<'_> {
+    fn model(&self) -> PyResult<Model> {
+        Ok(Model {
+            points: rows::<f64, 3>(&self.0)?.to_vec(),
+            center: self.1,
+            spacing: self.2,
+            samples: rows::<f64, 3>(&self.4)?.to_vec(),
+            normals: rows::<f64, 3>(&self.5)?.to_vec(),
+            places: FieldPlaces { radius: self.3, ..self.6.places()? },
+            is_sided: self.7,
+        })
+    }
+}
+
+/// Prepare a model to be found; by the names of the crate's `Model`, with the arrays of its places.
+#[pyfunction]
+#[pyo3(signature = (scan, *, threads=None))]
+pub fn prepare_model<'py>(
+    py: Python<'py>,
+    scan: ScanArgument<'py>,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let scan = scan.scan()?;
+    let monitor = Monitor::default();
+    let run = || Model::new(&scan, threads, &monitor);
+    let check = || Python::attach(|py| py.check_signals());
+    let model = py.detach(|| watched(run, check, || monitor.cancel()))?;
+    let result = PyDict::new(py);
+    let matrix = |points: Vec<[f64; 3]>| {
+        let count = points.len();
+        points.into_flattened().into_pyarray(py).reshape([count, 3])
+    };
+    result.set_item("points", matrix(model.points)?)?;
+    result.set_item("center", model.center.to_pyarray(py))?;
+    result.set_item("spacing", model.spacing)?;
+    result.set_item("radius", model.places.radius)?;
+    result.set_item("samples", matrix(model.samples)?)?;
+    result.set_item("normals", matrix(model.normals)?)?;
+    result.set_item("is_sided", model.is_sided)?;
+    let (places, arrays) = (model.places, PyDict::new(py));
+    let total = places.len();
+    arrays.set_item("points", matrix(places.points)?)?;
+    arrays.set_item("vectors", table(py, places.vectors.into_flattened(), total)?)?;
+    arrays.set_item("axes", table(py, places.axes.into_flattened(), total)?)?;
+    arrays.set_item("tangents", table(py, places.tangents.into_flattened(), total)?)?;
+    let phases = places.phases.as_flattened().as_flattened().as_flattened().to_vec();
+    arrays.set_item("phases", table(py, phases, total)?)?;
+    arrays.set_item("count", places.count.into_pyarray(py))?;
+    result.set_item("places", arrays)?;
+    Ok(result)
+}
+
+/// Find instances of models; see `surfsig.find_instances`. Of each, by the names of its attributes, with the number of
+/// its model.
+#[pyfunction]
+#[pyo3(signature = (models, scene, *, min_score, free_space_viewpoint=None, settings=None, threads=None, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
+pub fn find_instances<'py>(
+    py: Python<'py>,
+    models: Vec<ModelArgument<'py>>,
+    scene: ScanArgument<'py>,
+    min_score: f64,
+    free_space_viewpoint: Option<[f64; 3]>,
+    settings: Option<FindSettings>,
+    threads: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Vec<Bound<'py, PyDict>>> {
+    let models = models.iter().map(ModelArgument::model).collect::<PyResult<Vec<Model>>>()?;
+    let models: Vec<&Model> = models.iter().collect();
+    let scene = scene.scan()?;
+    let mut settings = settings.map_or_else(surfsig::FindSettings::default, |settings| settings.core);
+    settings.min_score = min_score;
+    settings.threads = threads;
+    let monitor = Monitor::default();
+    let total = 2 + FIND_STEPS_PER_MODEL * models.len();
+    let report = || -> PyResult<()> {
+        Python::attach(|py| {
+            py.check_signals()?;
+            let call = |call: &Py<PyAny>| call.call1(py, (monitor.done(), total)).map(|_| ());
+            progress.as_ref().map_or(Ok(()), call)
+        })
+    };
+    let run = || surfsig::find_instances(&models, &scene, free_space_viewpoint, &settings, &monitor);
+    let found = py.detach(|| watched(run, report, || monitor.cancel()))?;
+    report()?;
+    found.into_iter().map(|instance| to_python(py, instance)).collect()
+}
+
+fn to_python(py: Python<'_>, instance: Instance) -> PyResult<Bound<'_, PyDict>> {
+    let result = PyDict::new(py);
+    result.set_item("model", instance.model)?;
+    let matrix = instance.T_scene_model.to_matrix();
+    result.set_item("T_scene_model", matrix.as_flattened().to_pyarray(py).reshape([4, 4])?)?;
+    result.set_item("covariance", instance.covariance.as_flattened().to_pyarray(py).reshape([6, 6])?)?;
+    result.set_item("center", instance.center.to_pyarray(py))?;
+    result.set_item("score", instance.score)?;
+    result.set_item("visible", instance.visible)?;
+    result.set_item("overlap", instance.overlap)?;
+    result.set_item("rms", instance.rms)?;
+    result.set_item("free_directions", free_directions_to_python(&instance.free_directions))?;
+    let indices: Vec<i64> = instance.indices.into_iter().map(|index| index as i64).collect();
+    result.set_item("indices", indices.into_pyarray(py))?;
+    Ok(result)
+}
+
+/// Median distance of a point (n, 3) to its nearest other one; see `surfsig.spacing`.
+#[pyfunction]
+pub fn point_spacing(py: Python<'_>, points: PyReadonlyArray2<'_, f64>) -> PyResult<f64> {
+    let points = rows::<f64, 3>(&points)?;
+    Ok(py.detach(|| surfsig::point_spacing(points)))
+}

@@ -1,0 +1,192 @@
+//! Which candidates are instances: the best one takes its part of the scene away from the others, and so on.
+
+use super::evidence::{Evidence, ModelView};
+use super::model::Model;
+use super::scene::{Scene, SceneSurface};
+use super::{FindSettings, Instance};
+use crate::alignment::{PointToSurface, TargetSurface, even_sample, free_directions};
+use crate::geometry::RigidTransform;
+use crate::kd_tree::KdTree;
+use crate::{Error, Monitor};
+use nalgebra::{Matrix6, Vector3};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// A model that is looked for, with one of its sides out.
+pub(super) struct Sought<'a> {
+    /// The model's number.
+    number: usize,
+    model: Model,
+    view: ModelView<'a>,
+    tree: KdTree,
+    extent: f64,
+}
+
+impl<'a> Sought<'a> {
+    pub fn new(number: usize, model: Model, view: ModelView<'a>) -> Self {
+        Self { number, tree: KdTree::new(&model.samples), extent: model.extent(), model, view }
+    }
+}
+
+/// A transform of a model that is good enough.
+#[allow(non_snake_case)]
+#[derive(Clone)]
+pub(super) struct Candidate<'a> {
+    pub sought: Arc<Sought<'a>>,
+    pub T_scene_model: RigidTransform,
+    pub evidence: Evidence,
+}
+
+impl Candidate<'_> {
+    /// Whether a point of the scene is at the model's surface.
+    fn is_near(&self, inverse: &RigidTransform, point: [f64; 3], reach: f64) -> bool {
+        let limit = self.sought.extent + reach;
+        let gap = Vector3::from(point) - self.T_scene_model.translation;
+        gap.norm_squared() < limit * limit
+            && self.sought.tree.nearest(inverse.transform_point(point), reach).is_some()
+    }
+
+    /// Which points of the scene are at the model's surface, by their numbers.
+    fn near(&self, points: impl IndexedParallelIterator<Item = [f64; 3]>, distance: f64) -> Vec<usize> {
+        let inverse = self.T_scene_model.inverse();
+        let reach = distance * self.sought.view.scene.voxel;
+        points
+            .enumerate()
+            .with_min_len(1024)
+            .filter(|(_, point)| self.is_near(&inverse, *point, reach))
+            .map(|(number, _)| number)
+            .collect()
+    }
+
+    fn judged(&self, is_free: &[bool]) -> Evidence {
+        self.sought.view.judged(&[self.T_scene_model], is_free)[0]
+    }
+}
+
+/// The samples of each of the scene's surfaces that no instance explains yet.
+struct Unexplained {
+    surfaces: Vec<(Arc<SceneSurface>, Vec<bool>)>,
+}
+
+impl Unexplained {
+    fn new(candidates: &[Candidate<'_>]) -> Self {
+        let mut surfaces: Vec<(Arc<SceneSurface>, Vec<bool>)> = Vec::new();
+        for candidate in candidates {
+            let scene = &candidate.sought.view.scene;
+            if !surfaces.iter().any(|(known, _)| Arc::ptr_eq(known, scene)) {
+                surfaces.push((Arc::clone(scene), vec![true; scene.samples().len()]));
+            }
+        }
+        Self { surfaces }
+    }
+
+    fn of(&self, candidate: &Candidate<'_>) -> &[bool] {
+        let scene = &candidate.sought.view.scene;
+        let known = self.surfaces.iter().find(|(known, _)| Arc::ptr_eq(known, scene));
+        known.map_or(&[], |(_, is_free)| is_free)
+    }
+
+    /// Takes away what an instance explains.
+    fn take(&mut self, instance: &Candidate<'_>, distance: f64) {
+        for (surface, is_free) in &mut self.surfaces {
+            let points = surface.samples().par_iter().map(|sample| sample.place.map(f64::from));
+            for number in instance.near(points, distance) {
+                is_free[number] = false;
+            }
+        }
+    }
+}
+
+/// Takes the best candidate and its part of the scene away, until none is good enough; the best instance first.
+pub(super) fn accepted(
+    mut candidates: Vec<Candidate<'_>>,
+    scene: &Scene<'_>,
+    models: &[&Model],
+    settings: &FindSettings,
+    monitor: &Monitor,
+) -> Result<Vec<Instance>, Error> {
+    let mut unexplained = Unexplained::new(&candidates);
+    let mut is_taken = vec![false; scene.scan.points.len()];
+    let mut instances = Vec::new();
+    loop {
+        monitor.check()?;
+        // Of equal ones the first.
+        let best = (0..candidates.len()).reduce(|best, other| {
+            let is_better = candidates[other].evidence.score > candidates[best].evidence.score;
+            if is_better { other } else { best }
+        });
+        let Some(best) = best else { break };
+        let candidate = candidates.remove(best);
+        let Some((fitted, fit)) = refined(&candidate, scene, &is_taken, settings) else { continue };
+        let evidence = fitted.judged(unexplained.of(&fitted));
+        if evidence.score < settings.min_score {
+            continue;
+        }
+        let own = fitted.near(scene.scan.points.par_iter().copied(), settings.own_distance);
+        let own: Vec<usize> = own.into_iter().filter(|&number| !is_taken[number]).collect();
+        own.iter().for_each(|&number| is_taken[number] = true);
+        unexplained.take(&fitted, settings.own_distance);
+        instances.push(instance(&fitted, &fit, evidence, own, scene, models));
+        // Only those near it have lost something.
+        let middle = fitted.T_scene_model.translation;
+        for other in &mut candidates {
+            let reach = fitted.sought.view.reach + other.sought.view.reach;
+            if (other.T_scene_model.translation - middle).norm() < reach {
+                other.evidence = other.judged(unexplained.of(other));
+            }
+        }
+        candidates.retain(|candidate| candidate.evidence.score >= settings.min_score);
+    }
+    instances.sort_by(|a, b| b.score.total_cmp(&a.score));
+    Ok(instances)
+}
+
+/// The candidate fitted to the scene's own points, which no other instance has taken; `None` where hardly any is near.
+fn refined<'a>(
+    candidate: &Candidate<'a>,
+    scene: &Scene<'_>,
+    is_taken: &[bool],
+    settings: &FindSettings,
+) -> Option<(Candidate<'a>, PointToSurface)> {
+    let voxel = candidate.sought.view.scene.voxel;
+    let points = &scene.scan.points;
+    let near = candidate.near(points.par_iter().copied(), settings.own_distance);
+    let near: Vec<[f64; 3]> =
+        near.into_iter().filter(|&number| !is_taken[number]).map(|number| points[number]).collect();
+    let sample = even_sample(&near, settings.max_fitted, voxel);
+    let surface = TargetSurface::new(candidate.sought.model.points.clone(), voxel);
+    // The model's surface is the target: it is whole, and denser than what is seen.
+    let fit = surface.align(&sample, candidate.T_scene_model.inverse(), &settings.point_to_surface)?;
+    let fitted = Candidate { T_scene_model: fit.T_target_source.inverse(), ..candidate.clone() };
+    Some((fitted, fit))
+}
+
+fn instance(
+    fitted: &Candidate<'_>,
+    fit: &PointToSurface,
+    evidence: Evidence,
+    own: Vec<usize>,
+    scene: &Scene<'_>,
+    models: &[&Model],
+) -> Instance {
+    let translated = |by: [f64; 3]| RigidTransform::from_rotation_vector([0.0; 3], by);
+    let to_scene = translated(scene.scan.center) * fitted.T_scene_model;
+    // A small motion of the scene in the model's axes is the opposite one of the model in the scene's.
+    let rotation = fitted.T_scene_model.rotation;
+    let mut both = Matrix6::zeros();
+    both.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+    both.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
+    let free = free_directions(&fit.points, &fit.normals);
+    Instance {
+        model: fitted.sought.number,
+        T_scene_model: to_scene * translated(models[fitted.sought.number].center).inverse(),
+        covariance: (both * fit.covariance * both.transpose()).into(),
+        center: to_scene.transform_point(fit.center),
+        score: evidence.score,
+        visible: evidence.visible,
+        overlap: evidence.overlap,
+        rms: fit.rms,
+        free_directions: free.iter().map(|direction| direction.transformed(&to_scene)).collect(),
+        indices: own.into_iter().map(|number| scene.scan.numbers[number]).collect(),
+    }
+}

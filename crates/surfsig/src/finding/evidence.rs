@@ -1,0 +1,219 @@
+//! What speaks for a transform of a model: the part that the sensor saw, less what it saw through or missed.
+
+use super::FindSettings;
+use super::model::Model;
+use super::rim::Rim;
+use super::scene::SceneSurface;
+use crate::alignment::{FACING_AWAY, cosine_towards, transformed};
+use crate::depth_image::{ALIKE, FACING, SurfacePlace, dot};
+use crate::geometry::RigidTransform;
+use crate::kd_tree::KdTree;
+use crate::random::some_of;
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// Extents of a model around its middle that are looked at.
+const REACH: f64 = 1.2;
+/// Of these, the edge of the cells whose transforms are judged by one depth image.
+const CELL: f64 = 0.5;
+/// Half the diagonal of a cell, in its edge: the farthest that a model's middle is from that of its cell.
+const HALF_DIAGONAL: f64 = 0.87;
+/// Directions from which it is tried how much of a model can be seen at once.
+const VIEWS: usize = 100;
+
+/// What a scene says about a transform of a model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Evidence {
+    /// Confirmed less wrong samples, over the most of the model that can be seen at once.
+    pub score: f64,
+    /// Share of what faces the sensor that is seen, 0 to 1; of all where it is not known from where all was seen.
+    pub visible: f64,
+    /// Share of the model's surface that lies on the scene's, 0 to 1.
+    pub overlap: f64,
+}
+
+/// A model before the surface of a scene, seen from a viewpoint, or from nobody knows where.
+pub(super) struct ModelView<'a> {
+    pub scene: Arc<SceneSurface>,
+    /// Some of the model's samples.
+    pub samples: Vec<SurfacePlace>,
+    viewpoint: Option<[f64; 3]>,
+    /// From the model's middle, what is looked at.
+    pub reach: f64,
+    rim: Rim,
+    /// Share of the samples that can be seen at once, at most.
+    most_seen: f64,
+    settings: &'a FindSettings,
+}
+
+/// What depth images say of a model's samples.
+struct Seen {
+    /// Shares of all.
+    confirmed: f64,
+    wrong: f64,
+    /// Share of those that face the sensor.
+    visible: f64,
+    /// Of each to the line of sight.
+    cosines: Vec<f32>,
+}
+
+impl<'a> ModelView<'a> {
+    /// Takes so many of the model's samples at most.
+    pub fn new(
+        model: &Model,
+        scene: Arc<SceneSurface>,
+        viewpoint: Option<[f64; 3]>,
+        most: usize,
+        settings: &'a FindSettings,
+    ) -> Self {
+        let chosen = some_of(model.samples.len(), most);
+        let points: Vec<[f64; 3]> = chosen.iter().map(|&i| model.samples[i]).collect();
+        // In the order of a tree's leaves, searches one after the other find their part of another tree in the cache.
+        let near_each_other = KdTree::new(&points);
+        let order: Vec<usize> = near_each_other.indices().iter().map(|&i| chosen[i as usize]).collect();
+        let samples = model.surface(&order);
+        let rim = Rim::new(model, &samples, scene.voxel);
+        let most_seen = most_seen(&samples);
+        Self { rim, scene, viewpoint, reach: REACH * model.extent(), most_seen, samples, settings }
+    }
+
+    /// Transforms, fitted to the scene's surface near them by point to plane; distances are in voxels.
+    ///
+    /// `most` of the samples do it. Unobservable motions are not made.
+    pub fn aligned(
+        &self,
+        transforms: &[RigidTransform],
+        distances: (f64, f64, usize),
+        most: usize,
+    ) -> Vec<RigidTransform> {
+        let (first, last, count) = distances;
+        let ratio = |step: usize| step as f64 / (count.max(2) - 1) as f64;
+        let distance = |step: usize| self.scene.voxel * first * (last / first).powf(ratio(step));
+        let steps: Vec<f64> = (0..count).map(distance).collect();
+        let some: Vec<SurfacePlace> =
+            some_of(self.samples.len(), most).into_iter().map(|i| self.samples[i]).collect();
+        self.scene.surface.align_all(transforms, &some, &steps, self.viewpoint)
+    }
+
+    /// Weighs transforms (T_scene_model); `is_free` says which samples of the scene no other instance explains.
+    pub fn judged(&self, transforms: &[RigidTransform], is_free: &[bool]) -> Vec<Evidence> {
+        let Some(viewpoint) = self.viewpoint else {
+            return transforms.par_iter().map(|transform| self.weighed(transform, None, is_free)).collect();
+        };
+        let edge = CELL * self.reach;
+        let mut cells: FxHashMap<[i64; 3], Vec<usize>> = FxHashMap::default();
+        for (number, transform) in transforms.iter().enumerate() {
+            let cell = <[f64; 3]>::from(transform.translation).map(|x| (x / edge).round() as i64);
+            cells.entry(cell).or_default().push(number);
+        }
+        let of_cell = |(cell, numbers): (&[i64; 3], &Vec<usize>)| {
+            let middle = cell.map(|x| x as f64 * edge);
+            let reach = self.reach + HALF_DIAGONAL * edge;
+            let image = self.scene.image(middle, reach, viewpoint, is_free);
+            let judged = |&number: &usize| {
+                let transform = &transforms[number];
+                let mut local = *transform;
+                local.translation -= Vector3::from(middle);
+                let found = image.judge(&local, &self.samples, self.scene.voxel as f32);
+                let [confirmed, contradicted, missing] =
+                    [found.confirmed, found.contradicted, found.missing].map(f64::from);
+                let wrong =
+                    self.settings.contradicted_weight * contradicted + self.settings.missing_weight * missing;
+                // In the model's axes only one point has to be moved.
+                let from = transform.inverse().transform_point(viewpoint).map(|x| x as f32);
+                let cosines: Vec<f32> =
+                    self.samples.iter().map(|sample| cosine_towards(sample, from)).collect();
+                let facing = cosines.iter().filter(|&&cosine| cosine > FACING).count();
+                let facing = facing as f64 / self.samples.len().max(1) as f64;
+                let visible = confirmed / facing.max(confirmed).max(1e-9);
+                let seen = Seen { confirmed, wrong, visible, cosines };
+                (number, self.weighed(transform, Some(&seen), is_free))
+            };
+            numbers.iter().map(judged).collect::<Vec<_>>()
+        };
+        let mut judged: Vec<(usize, Evidence)> = cells.par_iter().map(of_cell).flatten_iter().collect();
+        judged.sort_unstable_by_key(|(number, _)| *number);
+        judged.into_iter().map(|(_, evidence)| evidence).collect()
+    }
+
+    /// The evidence, by what depth images say where it is known from where all was seen.
+    fn weighed(&self, transform: &RigidTransform, seen: Option<&Seen>, is_free: &[bool]) -> Evidence {
+        let score = |shares: &Seen| (shares.confirmed - shares.wrong) / self.most_seen;
+        if let Some(shares) = seen.filter(|shares| score(shares) <= 0.0) {
+            return Evidence { score: score(shares), visible: shares.visible, overlap: 0.0 };
+        }
+        let moved: Vec<SurfacePlace> =
+            self.samples.iter().map(|sample| transformed(transform, sample)).collect();
+        let touching = self.settings.touching_distance * self.scene.voxel;
+        let faces_away = |sample: usize| seen.is_some_and(|seen| seen.cosines[sample] < FACING_AWAY);
+        let nearest = |sample: usize| self.scene.surface.nearest(&moved[sample], touching);
+        let nearest: Vec<Option<usize>> =
+            (0..moved.len()).map(|sample| if faces_away(sample) { None } else { nearest(sample) }).collect();
+        let is_touching: Vec<bool> =
+            nearest.iter().map(|near| near.is_some_and(|sample| is_free[sample])).collect();
+        let share = |count: usize| count as f64 / self.samples.len().max(1) as f64;
+        let overlap = share(nearest.iter().flatten().count());
+        let (score, visible) = match seen {
+            Some(shares) => (score(shares), shares.visible),
+            None => {
+                let confirmed = share(is_touching.iter().filter(|&&touches| touches).count());
+                (self.settings.unknown_free_space_weight * confirmed / self.most_seen, confirmed)
+            }
+        };
+        if score <= 0.0 {
+            return Evidence { score, visible, overlap };
+        }
+        let on = || (0..moved.len()).filter(|&sample| is_touching[sample]);
+        let round = normal_spread(on().map(|sample| &self.samples[sample].normal));
+        let score = score
+            * (round / self.settings.round_spread).min(1.0)
+            * self.rim.ends(transform, &is_touching, &self.scene, is_free)
+            * self.agreement(on().filter_map(|sample| Some((&moved[sample], nearest[sample]?))));
+        Evidence { score, visible, overlap }
+    }
+
+    /// 1 where samples lie as close to the scene's as those of the same surface do, 0 where they touch by chance.
+    fn agreement<'b>(&self, pairs: impl Iterator<Item = (&'b SurfacePlace, usize)>) -> f64 {
+        let touching = (self.settings.touching_distance * self.scene.voxel) as f32;
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (sample, near) in pairs {
+            let near = &self.scene.samples()[near];
+            let gap = [0, 1, 2].map(|k| near.place[k] - sample.place[k]);
+            let residual = dot(&gap, &near.normal) / touching;
+            let cosine = dot(&sample.normal, &near.normal);
+            let agreement =
+                (1.0 - residual * residual).max(0.0) * ((cosine - ALIKE) / (1.0 - ALIKE)).max(0.0);
+            sum += f64::from(agreement);
+            count += 1.0;
+        }
+        let [chance, same] = self.settings.agreement_by_chance;
+        if count > 0.0 { ((sum / count - chance) / (same - chance)).clamp(0.0, 1.0) } else { 0.0 }
+    }
+}
+
+/// The largest share of samples that face one of many directions, spread over the sphere by the golden angle.
+fn most_seen(samples: &[SurfacePlace]) -> f64 {
+    let golden = PI * (3.0 - 5.0_f64.sqrt());
+    let seen_from = |view: usize| {
+        let z = 1.0 - (2 * view + 1) as f64 / VIEWS as f64;
+        let (sine, cosine) = (golden * view as f64).sin_cos();
+        let across = (1.0 - z * z).sqrt();
+        let direction = [across * cosine, across * sine, z].map(|x| x as f32);
+        samples.iter().filter(|sample| dot(&sample.normal, &direction) > FACING).count()
+    };
+    (0..VIEWS).map(seen_from).max().unwrap_or(0).max(1) as f64 / samples.len().max(1) as f64
+}
+
+/// How far normals are from being parallel: 1 less the largest eigenvalue of their second moments, 0 of none.
+fn normal_spread<'a>(normals: impl Iterator<Item = &'a [f32; 3]>) -> f64 {
+    let (mut moments, mut count) = (Matrix3::zeros(), 0.0);
+    for normal in normals {
+        let normal = Vector3::from(normal.map(f64::from));
+        moments += normal * normal.transpose();
+        count += 1.0;
+    }
+    if count > 0.0 { 1.0 - (moments / count).symmetric_eigenvalues().max() } else { 0.0 }
+}

@@ -1,0 +1,162 @@
+//! Where instances of models are in a scene: [`find_instances`].
+//!
+//! Each place of the scene proposes a transform by the place of a model that it is most similar to ([`proposals`]).
+//! Those that many agree on are fitted to the scene's surface and judged by what the sensor saw ([`evidence`],
+//! [`rim`]); the best ones become instances, each of which takes its points away from the others ([`acceptance`]).
+
+mod acceptance;
+mod evidence;
+mod model;
+mod proposals;
+mod result;
+mod rim;
+mod samples;
+mod scene;
+mod settings;
+
+pub use model::Model;
+pub use result::Instance;
+pub use settings::FindSettings;
+
+use crate::geometry::RigidTransform;
+use crate::scan::CenteredScan;
+use crate::{Error, Monitor, Scan, with_threads};
+use acceptance::{Candidate, Sought, accepted};
+use evidence::ModelView;
+use model::{MIN_POINTS, SPACINGS_PER_RADIUS};
+use proposals::{different, proposed_transforms};
+use scene::Scene;
+use std::sync::Arc;
+
+/// Steps of each model that [`Monitor::done`] counts; [`find_instances`] takes one more before and after all.
+pub const FIND_STEPS_PER_MODEL: usize = 3;
+
+/// Finds every instance of models in a scene; the best first. There may be none.
+///
+/// `free_space_viewpoint` is where the sensor stood if all points of the scene were seen from there: then what a model
+/// has where the sensor saw through, or saw nothing, speaks against it. The result is the same whatever the number of
+/// threads.
+///
+/// # Errors
+/// [`Error::InvalidModel`] for a model whose arrays do not belong together, [`Error::InvalidRadius`] for coordinates of
+/// no use, [`Error::Threads`], [`Error::Cancelled`].
+///
+/// ```
+/// use surfsig::{find_instances, FindSettings, Model, Monitor, PointCloud, RigidTransform, Scan};
+///
+/// // A bent egg, and the same one elsewhere, of which half is seen.
+/// let golden = std::f64::consts::PI * (5.0_f64.sqrt() - 1.0);
+/// let egg: Vec<[f64; 3]> = (0..6000)
+///     .map(|i| {
+///         let z = 1.0 - (f64::from(i) + 0.5) / 3000.0;
+///         let (sine, cosine) = (golden * f64::from(i)).sin_cos();
+///         let r = (1.0 - z * z).sqrt();
+///         [r * cosine + 0.4 * z * z, 0.7 * r * sine + 0.3 * cosine * r * z, 1.6 * z]
+///     })
+///     .collect();
+/// let model = Model::new(&Scan::new(PointCloud::new_f64(&egg)), None, &Monitor::default())?;
+/// let truth = RigidTransform::from_rotation_vector([0.4, -1.0, 0.7], [5.0, 3.0, 9.0]);
+/// let seen: Vec<[f64; 3]> =
+///     egg.iter().filter(|p| p[0] > 0.1).map(|p| truth.transform_point(*p)).collect();
+/// let scene = Scan::new(PointCloud::new_f64(&seen));
+/// let found = find_instances(&[&model], &scene, None, &FindSettings::default(), &Monitor::default())?;
+/// assert_eq!(found.len(), 1);
+/// let off = (truth.inverse() * found[0].T_scene_model).log();
+/// assert!(off.iter().all(|component| component.abs() < 0.02));
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+pub fn find_instances(
+    models: &[&Model],
+    scene: &Scan<'_>,
+    free_space_viewpoint: Option<[f64; 3]>,
+    settings: &FindSettings,
+    monitor: &Monitor,
+) -> Result<Vec<Instance>, Error> {
+    models.iter().try_for_each(|model| model.check())?;
+    with_threads(settings.threads, || {
+        let scan = CenteredScan::new(scene);
+        let radii = models.iter().map(|model| model.places.radius);
+        let radius = radii.fold(f64::INFINITY, f64::min);
+        if scan.points.len() < MIN_POINTS || models.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut scene = Scene::new(scan, free_space_viewpoint, radius, settings, monitor)?;
+        monitor.add(1);
+        let mut candidates = Vec::new();
+        for (number, model) in models.iter().enumerate() {
+            candidates.extend(candidates_of(number, model, &mut scene, settings, monitor)?);
+        }
+        let found = accepted(candidates, &scene, models, settings, monitor)?;
+        monitor.add(1);
+        Ok(found)
+    })?
+}
+
+/// Transforms of a model that are good enough where no other instance is near; the best first.
+fn candidates_of<'a>(
+    number: usize,
+    model: &Model,
+    scene: &mut Scene<'_>,
+    settings: &'a FindSettings,
+    monitor: &Monitor,
+) -> Result<Vec<Candidate<'a>>, Error> {
+    let least = SPACINGS_PER_RADIUS * scene.spacing;
+    let model = if model.places.radius < least { model.with_radius(least, monitor)? } else { model.clone() };
+    let voxel = scene.voxel(&model)?;
+    let places = scene.places(model.places.radius, voxel)?;
+    let (coarse, fine) = (scene.coarse_surface(voxel)?, scene.fine_surface(voxel)?);
+    monitor.add(1);
+    let mut sides = vec![model];
+    if !(sides[0].is_sided && scene.is_oriented) {
+        let other = sides[0].inside_out(monitor)?;
+        sides.push(other);
+    }
+    let mut candidates = Vec::new();
+    for side in sides {
+        monitor.check()?;
+        let view = |surface: &Arc<_>, most| {
+            ModelView::new(&side, Arc::clone(surface), scene.viewpoint, most, settings)
+        };
+        let proposed = proposed_transforms(&side.places, &places, settings);
+        let [distance, angle] = [settings.same[0] * side.places.radius, settings.same[1]];
+        let first = view(&coarse, settings.first_points);
+        let kept = best_first(&first, &proposed, settings.first_distances);
+        let kept = different(kept, settings.kept, distance, angle);
+        let second = view(&coarse, settings.coarse_points);
+        let tried = best_first(&second, &kept, settings.coarse_distances);
+        let tried = different(tried, settings.tried, distance, angle);
+        monitor.check()?;
+        if tried.is_empty() {
+            continue;
+        }
+        let last = view(&fine, settings.fine_points);
+        let aligned = last.aligned(&tried, settings.fine_distances, settings.aligned_points);
+        let judged = last.judged(&aligned, &vec![true; fine.samples().len()]);
+        let sought = Arc::new(Sought::new(number, side, last));
+        let good = aligned.into_iter().zip(judged).filter(|(_, found)| found.score >= settings.min_score);
+        candidates.extend(good.map(|(transform, evidence)| Candidate {
+            sought: Arc::clone(&sought),
+            T_scene_model: transform,
+            evidence,
+        }));
+    }
+    monitor.add(FIND_STEPS_PER_MODEL - 1);
+    candidates.sort_by(|a, b| b.evidence.score.total_cmp(&a.evidence.score));
+    Ok(candidates)
+}
+
+/// Transforms, aligned by the samples of a view, that anything speaks for; the best first.
+fn best_first(
+    view: &ModelView<'_>,
+    transforms: &[RigidTransform],
+    distances: (f64, f64, usize),
+) -> impl Iterator<Item = RigidTransform> + use<> {
+    let aligned = view.aligned(transforms, distances, usize::MAX);
+    let judged = view.judged(&aligned, &vec![true; view.scene.samples().len()]);
+    let mut order: Vec<usize> = (0..aligned.len()).filter(|&i| judged[i].score > 0.0).collect();
+    order.sort_by(|&a, &b| judged[b].score.total_cmp(&judged[a].score));
+    order.into_iter().map(move |i| aligned[i])
+}
+
+#[cfg(test)]
+mod tests;

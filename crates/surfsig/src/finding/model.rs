@@ -1,0 +1,179 @@
+//! A model as it is looked for, prepared once.
+
+use super::samples::{Samples, described, mean_length, oriented_outwards};
+use crate::depth_image::SurfacePlace;
+use crate::kd_tree::KdTree;
+use crate::scan::CenteredScan;
+use crate::spacing::point_spacing;
+use crate::{Error, FieldPlaces, Monitor, Scan, with_threads};
+
+/// Radius of the patches in units of the median distance of the model's points from their centre.
+const RADIUS_SHARE: f64 = 0.4;
+/// Voxels of a patch's radius between the samples of a surface.
+const VOXELS_PER_RADIUS: f64 = 16.0;
+/// Point spacings that a patch's radius has at least.
+pub(super) const SPACINGS_PER_RADIUS: f64 = 8.0;
+/// Length of the mean normal below which a surface goes all around, and has an outer side.
+const CLOSED: f64 = 0.2;
+/// Points without which there is nothing to find.
+pub(super) const MIN_POINTS: usize = 50;
+
+/// What [`crate::find_instances`] looks for. Coordinates are about `center`, so that all digits are kept.
+///
+/// ```
+/// use surfsig::{Model, Monitor, PointCloud, Scan};
+/// let golden = std::f64::consts::PI * (5.0_f64.sqrt() - 1.0);
+/// let egg: Vec<[f64; 3]> = (0..4000)
+///     .map(|i| {
+///         let z = 1.0 - (f64::from(i) + 0.5) / 2000.0;
+///         let (sine, cosine) = (golden * f64::from(i)).sin_cos();
+///         [(1.0 - z * z).sqrt() * cosine, (1.0 - z * z).sqrt() * sine, 1.5 * z]
+///     })
+///     .collect();
+/// let model = Model::new(&Scan::new(PointCloud::new_f64(&egg)), None, &Monitor::default())?;
+/// assert!(model.is_sided && model.normals.len() == model.samples.len());
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// All points.
+    pub points: Vec<[f64; 3]>,
+    /// In the coordinates in which the model came.
+    pub center: [f64; 3],
+    /// Distance between the points.
+    pub spacing: f64,
+    /// Points of the surface, one per voxel.
+    pub samples: Vec<[f64; 3]>,
+    /// Outward unit normals of the samples.
+    pub normals: Vec<[f64; 3]>,
+    /// Places all over the surface, with their field signatures and the radius of their patches.
+    pub places: FieldPlaces,
+    /// Whether it is known which side is the outer one.
+    pub is_sided: bool,
+}
+
+impl Model {
+    /// Prepares a model: a whole object, or one view of it. Its patches get a radius by its size.
+    ///
+    /// # Errors
+    /// [`Error::InvalidModel`] where it has too few points, no extent or no surface; [`Error::Threads`],
+    /// [`Error::Cancelled`].
+    pub fn new(scan: &Scan<'_>, threads: Option<usize>, monitor: &Monitor) -> Result<Self, Error> {
+        with_threads(threads, || Self::prepared(CenteredScan::new(scan), monitor))?
+    }
+
+    fn prepared(scan: CenteredScan, monitor: &Monitor) -> Result<Self, Error> {
+        let count = scan.points.len();
+        if count < MIN_POINTS {
+            let text = format!("a model needs {MIN_POINTS} finite points at least, not {count}");
+            return Err(Error::InvalidModel(text));
+        }
+        let spacing = point_spacing(&scan.points);
+        let radius = (RADIUS_SHARE * scan.size()).max(SPACINGS_PER_RADIUS * spacing);
+        if radius == 0.0 {
+            return Err(Error::InvalidModel("a model's points must not all be at one place".into()));
+        }
+        if scan.scan().is_oriented() {
+            return Self::described(scan, radius, spacing, true, monitor);
+        }
+        let scan = oriented_outwards(scan, radius, monitor)?;
+        // What goes all around has its volume inside.
+        let is_closed =
+            scan.directions.as_ref().is_some_and(|all| !all.is_empty() && mean_length(all.iter()) < CLOSED);
+        Self::described(scan, radius, spacing, is_closed, monitor)
+    }
+
+    fn described(
+        scan: CenteredScan,
+        radius: f64,
+        spacing: f64,
+        is_sided: bool,
+        monitor: &Monitor,
+    ) -> Result<Self, Error> {
+        let samples = Samples::new(&scan, (radius / VOXELS_PER_RADIUS).max(spacing), monitor)?.points;
+        if samples.is_empty() {
+            let text = "a model's points must lie on a surface: these have no normals";
+            return Err(Error::InvalidModel(text.into()));
+        }
+        let places = described(&scan, &samples, radius, monitor)?;
+        Ok(Self {
+            center: scan.center,
+            spacing,
+            samples: samples.iter().map(|sample| sample.place.map(f64::from)).collect(),
+            normals: samples.iter().map(|sample| sample.normal.map(f64::from)).collect(),
+            places,
+            is_sided,
+            points: scan.points,
+        })
+    }
+
+    /// The same with patches of another radius.
+    pub(super) fn with_radius(&self, radius: f64, monitor: &Monitor) -> Result<Self, Error> {
+        Self::described(self.oriented(1.0), radius, self.spacing, self.is_sided, monitor)
+    }
+
+    /// The same with the surface's other side as the outer one.
+    pub(super) fn inside_out(&self, monitor: &Monitor) -> Result<Self, Error> {
+        Self::described(self.oriented(-1.0), self.places.radius, self.spacing, self.is_sided, monitor)
+    }
+
+    /// The points, each with the normal of the nearest sample times `side`.
+    fn oriented(&self, side: f64) -> CenteredScan {
+        let tree = KdTree::new(&self.samples);
+        let direction = |point: &[f64; 3]| {
+            tree.nearest(*point, f64::INFINITY)
+                .map_or([0.0; 3], |(sample, _)| self.normals[sample as usize].map(|x| (side * x) as f32))
+        };
+        CenteredScan {
+            points: self.points.clone(),
+            numbers: Vec::new(),
+            center: self.center,
+            viewpoint: None,
+            directions: Some(self.points.iter().map(direction).collect()),
+        }
+    }
+
+    /// An error where arrays that somebody stored do not belong together.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        let finite = |points: &[[f64; 3]]| points.iter().flatten().all(|x| x.is_finite());
+        let places = &self.places;
+        let lengths = [places.vectors.len(), places.axes.len(), places.tangents.len(), places.phases.len()];
+        let is_whole = self.normals.len() == self.samples.len()
+            && !self.samples.is_empty()
+            && self.points.len() >= MIN_POINTS
+            && lengths == [places.points.len(); 4]
+            && [self.spacing, places.radius].iter().all(|length| length.is_finite() && *length >= 0.0)
+            && [&self.points, &self.samples, &self.normals, &places.points].iter().all(|all| finite(all));
+        if is_whole {
+            Ok(())
+        } else {
+            Err(Error::InvalidModel("a model's arrays do not belong together".into()))
+        }
+    }
+
+    /// Distance between the samples.
+    pub(super) fn voxel(&self) -> f64 {
+        self.places.radius / VOXELS_PER_RADIUS
+    }
+
+    /// Whether the surface goes all around.
+    pub(super) fn is_closed(&self) -> bool {
+        let normals: Vec<[f32; 3]> = self.normals.iter().map(|normal| normal.map(|x| x as f32)).collect();
+        mean_length(normals.iter()) < CLOSED
+    }
+
+    /// Largest distance of a sample from the centre; points that lie on no surface have no sample.
+    pub(super) fn extent(&self) -> f64 {
+        let square = |sample: &[f64; 3]| sample.iter().map(|x| x * x).sum::<f64>();
+        self.samples.iter().map(square).fold(0.0, f64::max).sqrt()
+    }
+
+    /// The samples with their normals, of those with the given numbers.
+    pub(super) fn surface(&self, numbers: &[usize]) -> Vec<SurfacePlace> {
+        let sample = |&i: &usize| SurfacePlace {
+            place: self.samples[i].map(|x| x as f32),
+            normal: self.normals[i].map(|x| x as f32),
+        };
+        numbers.iter().map(sample).collect()
+    }
+}

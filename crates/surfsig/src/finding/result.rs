@@ -1,0 +1,40 @@
+//! What [`crate::find_instances`] gives.
+
+use crate::alignment::FreeDirection;
+use crate::geometry::RigidTransform;
+
+/// A model that is in a scene.
+///
+/// ```
+/// use surfsig::{find_instances, FindSettings, Instance, Monitor, PointCloud, Scan};
+/// let scene = Scan::new(PointCloud::new(&[]));
+/// let found: Vec<Instance> = find_instances(&[], &scene, None, &FindSettings::default(), &Monitor::default())?;
+/// assert!(found.is_empty());
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+#[allow(non_snake_case)]
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instance {
+    /// The model's number among those that were looked for.
+    pub model: usize,
+    /// Takes the model's points, in the coordinates in which it came, to the scene.
+    pub T_scene_model: RigidTransform,
+    /// Of the small twist (rotation vector in radians, then translation) in the scene's axes, about `center`, that takes
+    /// the given transform to the true one.
+    pub covariance: [[f64; 6]; 6],
+    /// Middle of what lies on the scene's points, in the scene's coordinates.
+    pub center: [f64; 3],
+    /// What of the model is confirmed, less what is wrong, over the most of it that can be seen at once; 0.6 of that
+    /// where it is not known from where the scene was seen.
+    pub score: f64,
+    /// Share of the surface facing the sensor that is seen, 0 to 1; of all of it where the viewpoint is not known.
+    pub visible: f64,
+    /// Share of the model's whole surface that lies on the scene's, 0 to 1.
+    pub overlap: f64,
+    /// Root mean square of the distances there, in the scans' unit.
+    pub rms: f64,
+    /// Motions, in the scene's coordinates, that what is seen does not determine.
+    pub free_directions: Vec<FreeDirection>,
+    /// Numbers of the scene's points that are the instance's, ascending.
+    pub indices: Vec<usize>,
+}

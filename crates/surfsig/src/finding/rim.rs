@@ -1,0 +1,98 @@
+//! Where a model ends: there, the scene's surface must end as well.
+
+use super::model::Model;
+use super::scene::SceneSurface;
+use crate::alignment::transformed;
+use crate::depth_image::{SurfacePlace, dot};
+use crate::geometry::{RigidTransform, axes_across};
+use crate::kd_tree::KdTree;
+use nalgebra::Vector3;
+use std::f64::consts::TAU;
+
+/// Voxels along the surface from a sample of the model to a point beside it.
+const STEP: f64 = 3.0;
+/// Voxels from that to all of the model at least.
+const CLEARANCE: f64 = 1.5;
+/// Directions in which a step is tried.
+const DIRECTIONS: usize = 8;
+/// Voxels from a point beside the model to the scene's nearest sample within which the scene goes on.
+const NEAR: f64 = 1.0;
+/// And of that sample from the point's tangent plane.
+const MAX_RESIDUAL: f64 = 0.75;
+/// Cosine to the mean normal of a view of an object, from which on its surface does not end because it was too steep to
+/// be seen.
+const FACING_VIEW: f64 = 0.5;
+/// Points beside the model without which its rim says nothing.
+const MIN_POINTS: usize = 8;
+/// Share of the rim where the scene goes on, from which on the model lies in a larger surface, as a box sunk in a
+/// table. Of true poses of a whole model hardly any does, but a neighbour may be flush with it.
+const TOO_MUCH: f64 = 0.4;
+/// The same of a view, which also ends where something was before it, and at its holes.
+const TOO_MUCH_OF_VIEW: f64 = 0.8;
+
+/// Points beside a model, each a step along the surface from a sample near its end.
+pub(super) struct Rim {
+    /// Numbers of the samples that were stepped from.
+    from: Vec<u32>,
+    points: Vec<SurfacePlace>,
+    too_much: f64,
+}
+
+impl Rim {
+    /// Steps from samples, which are some of the model's.
+    pub fn new(model: &Model, samples: &[SurfacePlace], voxel: f64) -> Self {
+        let tree = KdTree::new(&model.points);
+        let is_closed = model.is_closed();
+        let mean = model.normals.iter().map(|&normal| Vector3::from(normal)).sum::<Vector3<f64>>();
+        let (mut from, mut points) = (Vec::new(), Vec::new());
+        for (number, sample) in (0..).zip(samples) {
+            let normal = Vector3::from(sample.normal.map(f64::from));
+            if !is_closed && normal.dot(&mean) <= FACING_VIEW * mean.norm() {
+                continue;
+            }
+            let [across, along] = axes_across(&normal.normalize());
+            for step in 0..DIRECTIONS {
+                let (sine, cosine) = (TAU * step as f64 / DIRECTIONS as f64).sin_cos();
+                let offset = (across * cosine + along * sine) * (STEP * voxel);
+                let beside: [f64; 3] = (Vector3::from(sample.place.map(f64::from)) + offset).into();
+                if tree.nearest(beside, CLEARANCE * voxel).is_none() {
+                    from.push(number);
+                    points.push(SurfacePlace { place: beside.map(|x| x as f32), normal: sample.normal });
+                }
+            }
+        }
+        Self { from, points, too_much: if is_closed { TOO_MUCH } else { TOO_MUCH_OF_VIEW } }
+    }
+
+    /// 1 where the scene ends with the model under T_scene_model, 0 where it goes on, or between.
+    ///
+    /// `is_touching` says which samples of the model lie on the scene's surface: where the model is hidden its rim does
+    /// not count. `is_free` says which samples of the scene no other instance explains.
+    pub fn ends(
+        &self,
+        transform: &RigidTransform,
+        is_touching: &[bool],
+        scene: &SceneSurface,
+        is_free: &[bool],
+    ) -> f64 {
+        let (mut asked, mut going_on) = (0_usize, 0_usize);
+        for (&from, point) in self.from.iter().zip(&self.points) {
+            if !is_touching[from as usize] {
+                continue;
+            }
+            asked += 1;
+            let point = transformed(transform, point);
+            if let Some(near) = scene.surface.nearest(&point, NEAR * scene.voxel)
+                && is_free[near]
+            {
+                let gap = [0, 1, 2].map(|k| scene.samples()[near].place[k] - point.place[k]);
+                going_on +=
+                    usize::from(f64::from(dot(&gap, &point.normal).abs()) < MAX_RESIDUAL * scene.voxel);
+            }
+        }
+        if asked < MIN_POINTS {
+            return 1.0;
+        }
+        (1.0 - going_on as f64 / asked as f64 / self.too_much).max(0.0)
+    }
+}

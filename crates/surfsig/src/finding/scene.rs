@@ -1,0 +1,146 @@
+//! A scene as models are looked for in it: its surface, and what its sensor saw.
+
+use super::FindSettings;
+use super::model::Model;
+use super::samples::{Samples, described, oriented_outwards};
+use crate::alignment::OrientedSurface;
+use crate::depth_image::{DepthImage, SurfacePlace};
+use crate::scan::CenteredScan;
+use crate::spacing::point_spacing;
+use crate::voxels::Voxels;
+use crate::{Error, FieldPlaces, Monitor};
+use nalgebra::Vector3;
+use std::sync::Arc;
+
+/// The surface of a scene, one sample per voxel.
+pub(super) struct SceneSurface {
+    pub surface: OrientedSurface,
+    pub voxel: f64,
+}
+
+impl SceneSurface {
+    pub fn new(samples: Vec<SurfacePlace>, voxel: f64) -> Self {
+        Self { surface: OrientedSurface::new(samples), voxel }
+    }
+
+    pub fn samples(&self) -> &[SurfacePlace] {
+        self.surface.points()
+    }
+
+    /// What the sensor saw around a point, about that point. `is_free` says which samples may confirm a model.
+    pub fn image(&self, middle: [f64; 3], reach: f64, viewpoint: [f64; 3], is_free: &[bool]) -> DepthImage {
+        let (mut near, mut free) = (Vec::new(), Vec::new());
+        let center = middle.map(|x| x as f32);
+        let farthest = (4.0 * reach * reach) as f32;
+        for (sample, &is_free) in self.samples().iter().zip(is_free) {
+            let place = [0, 1, 2].map(|k| sample.place[k] - center[k]);
+            if place[0] * place[0] + place[1] * place[1] + place[2] * place[2] <= farthest {
+                near.push(SurfacePlace { place, normal: sample.normal });
+                free.push(is_free);
+            }
+        }
+        let from = [0, 1, 2].map(|k| viewpoint[k] - middle[k]);
+        DepthImage::new(&near, &free, from, self.voxel, reach, None)
+    }
+}
+
+/// A scan, prepared for models; what is made once for a length is kept.
+pub(super) struct Scene<'a> {
+    pub scan: CenteredScan,
+    pub spacing: f64,
+    /// Whether the sensor says which side of the surface is the outer one.
+    pub is_oriented: bool,
+    /// From where all was seen, about the scan's centre, where that is known.
+    pub viewpoint: Option<[f64; 3]>,
+    settings: &'a FindSettings,
+    monitor: &'a Monitor,
+    samples: Vec<(f64, Arc<Samples>)>,
+    surfaces: Vec<(f64, Arc<SceneSurface>)>,
+    places: Vec<(f64, Arc<FieldPlaces>)>,
+}
+
+impl<'a> Scene<'a> {
+    /// `radius` is that of patches over which the surface's side is told where the sensor does not.
+    pub fn new(
+        scan: CenteredScan,
+        free_space_viewpoint: Option<[f64; 3]>,
+        radius: f64,
+        settings: &'a FindSettings,
+        monitor: &'a Monitor,
+    ) -> Result<Self, Error> {
+        let is_oriented = scan.scan().is_oriented();
+        let viewpoint = free_space_viewpoint.map(|point| [0, 1, 2].map(|k| point[k] - scan.center[k]));
+        let scan = if is_oriented { scan } else { oriented_outwards(scan, radius, monitor)? };
+        Ok(Self {
+            spacing: point_spacing(&scan.points),
+            scan,
+            is_oriented,
+            viewpoint: viewpoint.filter(|_| is_oriented),
+            settings,
+            monitor,
+            samples: Vec::new(),
+            surfaces: Vec::new(),
+            places: Vec::new(),
+        })
+    }
+
+    /// Distance between the samples in which a model is looked for.
+    pub fn voxel(&mut self, model: &Model) -> Result<f64, Error> {
+        let voxel = model.voxel().max(model.spacing).max(self.settings.spacings_per_voxel * self.spacing);
+        Ok(voxel.max(self.settings.noises_per_voxel * self.samples(voxel)?.noise))
+    }
+
+    /// Its places with signatures of patches of a radius; `voxel` is that of the samples that tell where it is flat.
+    pub fn places(&mut self, radius: f64, voxel: f64) -> Result<Arc<FieldPlaces>, Error> {
+        if let Some((_, known)) = self.places.iter().find(|(of, _)| *of == radius) {
+            return Ok(Arc::clone(known));
+        }
+        let samples = self.samples(voxel)?;
+        let places = Arc::new(described(&self.scan, &samples.points, radius, self.monitor)?);
+        self.places.push((radius, Arc::clone(&places)));
+        Ok(places)
+    }
+
+    fn samples(&mut self, voxel: f64) -> Result<Arc<Samples>, Error> {
+        if let Some((_, known)) = self.samples.iter().find(|(of, _)| *of == voxel) {
+            return Ok(Arc::clone(known));
+        }
+        let samples = Arc::new(Samples::new(&self.scan, voxel, self.monitor)?);
+        self.samples.push((voxel, Arc::clone(&samples)));
+        Ok(samples)
+    }
+
+    /// Its surface with one sample per voxel.
+    pub fn fine_surface(&mut self, voxel: f64) -> Result<Arc<SceneSurface>, Error> {
+        if let Some((_, known)) = self.surfaces.iter().find(|(of, _)| *of == voxel) {
+            return Ok(Arc::clone(known));
+        }
+        let samples = self.samples(voxel)?;
+        let surface = Arc::new(SceneSurface::new(samples.points.clone(), voxel));
+        self.surfaces.push((voxel, Arc::clone(&surface)));
+        Ok(surface)
+    }
+
+    /// The same with the larger voxels of the first judgement, from the samples of the last.
+    pub fn coarse_surface(&mut self, voxel: f64) -> Result<Arc<SceneSurface>, Error> {
+        let coarse = self.settings.coarse_voxels * voxel;
+        if let Some((_, known)) = self.surfaces.iter().find(|(of, _)| *of == coarse) {
+            return Ok(Arc::clone(known));
+        }
+        let surface = Arc::new(SceneSurface::new(thinned(&self.samples(voxel)?.points, coarse), coarse));
+        self.surfaces.push((coarse, Arc::clone(&surface)));
+        Ok(surface)
+    }
+}
+
+/// Of each voxel the mean of the points, with the direction of their mean normal.
+fn thinned(points: &[SurfacePlace], voxel: f64) -> Vec<SurfacePlace> {
+    let positions: Vec<[f64; 3]> = points.iter().map(|point| point.place.map(f64::from)).collect();
+    let voxels = Voxels::new(&positions, voxel);
+    let normals = voxels.sums(points.iter().map(|point| point.normal.map(f64::from)));
+    let point = |(place, normal): ([f64; 3], [f64; 3])| {
+        let normal = Vector3::from(normal).try_normalize(0.0)?;
+        Some(SurfacePlace { place: place.map(|x| x as f32), normal: normal.map(|x| x as f32).into() })
+    };
+    voxels.means(&positions).into_iter().zip(normals).filter_map(point).collect()
+}

@@ -1,0 +1,110 @@
+//! How instances are searched and judged.
+
+use crate::alignment::PointToSurfaceSettings;
+
+/// What an expert may change; nothing has to be set. Lengths in voxels are in those of the scene's surface.
+///
+/// ```
+/// let settings = surfsig::FindSettings { min_score: 0.3, ..Default::default() };
+/// assert_eq!(settings.proposals, 1000);
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct FindSettings {
+    /// Score of an instance, at least: half hidden ones have about 0.4, and what is not there below 0.2.
+    pub min_score: f64,
+    /// Proposed transforms that are judged by few points. With 600, 80 points each and 150 kept, 15 of the 30 half
+    /// hidden figures and frusta of seeds 1 to 3 of `benchmarks/finding.py` are found, in place of 22; with 1500 and
+    /// 450 kept no more.
+    pub proposals: usize,
+    /// Points of the model in that first judgement.
+    pub first_points: usize,
+    /// Voxels between correspondences in the steps of its alignment: from, to, how many.
+    pub first_distances: (f64, f64, usize),
+    /// Proposals that are judged by more points.
+    pub kept: usize,
+    /// Points of the model in that second judgement.
+    pub coarse_points: usize,
+    /// Voxels between correspondences in the steps of its alignment.
+    pub coarse_distances: (f64, f64, usize),
+    /// Voxels of both judgements, in those of the last.
+    pub coarse_voxels: f64,
+    /// Transforms that are aligned and judged by most points.
+    pub tried: usize,
+    /// Points of the model in their alignment.
+    pub aligned_points: usize,
+    /// Voxels between correspondences in its steps.
+    pub fine_distances: (f64, f64, usize),
+    /// Points of the model in their judgement: shares of 3000 have a standard error of 0.01 at most.
+    pub fine_points: usize,
+    /// Distance between the points of the scene's surface, in its point spacings at least: steep surfaces have fewer
+    /// points.
+    pub spacings_per_voxel: f64,
+    /// The same in the scene's noise, so that equal surfaces are well within a voxel.
+    pub noises_per_voxel: f64,
+    /// Patch radii, and radians, within which two proposed transforms agree.
+    pub agreement: [f64; 2],
+    /// Of these distances, between two proposals of which the less agreed one is left out.
+    pub merged_share: f64,
+    /// Patch radii, and radians, within which two aligned transforms are the same.
+    pub same: [f64; 2],
+    /// Points of the scene that an instance is fitted to at last.
+    pub max_fitted: usize,
+    /// How it is fitted to them: until the start does not matter, as instances are few.
+    pub point_to_surface: PointToSurfaceSettings,
+    /// Voxels from an instance's surface within which the scene's points are its own.
+    pub own_distance: f64,
+    /// What a point that the sensor saw through counts, in confirmed ones: of true poses hardly any is seen through.
+    pub contradicted_weight: f64,
+    /// The same of one where the sensor saw nothing: sensors miss dark and shiny surfaces.
+    pub missing_weight: f64,
+    /// What a confirmed point counts where nobody knows what the sensor saw through, and clutter reaches more.
+    pub unknown_free_space_weight: f64,
+    /// Spread of confirmed normals (1 less the largest eigenvalue of their second moments) from which on they are more
+    /// than a plane, which anything has.
+    pub round_spread: f64,
+    /// Voxels from the scene's next point within which a point of the model lies on the scene.
+    pub touching_distance: f64,
+    /// Mean agreement in residual and normal, of 1, that another shape reaches where it touches by chance (0.4 to 0.6),
+    /// and that equal surfaces reach (0.76 to 0.97, on simulated and real scans).
+    pub agreement_by_chance: [f64; 2],
+    /// Number of threads; all cores where it is `None`. The result is the same, bit for bit.
+    pub threads: Option<usize>,
+}
+
+impl Default for FindSettings {
+    fn default() -> Self {
+        Self {
+            min_score: 0.25,
+            proposals: 1000,
+            first_points: 100,
+            first_distances: (4.0, 2.5, 4),
+            kept: 300,
+            coarse_points: 300,
+            coarse_distances: (2.5, 1.5, 4),
+            coarse_voxels: 2.0,
+            tried: 60,
+            aligned_points: 1000,
+            fine_distances: (2.5, 1.5, 5),
+            fine_points: 3000,
+            spacings_per_voxel: 1.5,
+            noises_per_voxel: 2.5,
+            agreement: [0.5, 0.35],
+            merged_share: 0.5,
+            same: [0.25, 0.2],
+            max_fitted: 3000,
+            point_to_surface: PointToSurfaceSettings {
+                epsilon: 1e-5,
+                max_iterations: 15,
+                ..Default::default()
+            },
+            own_distance: 1.5,
+            contradicted_weight: 5.0,
+            missing_weight: 1.0,
+            unknown_free_space_weight: 0.6,
+            round_spread: 0.1,
+            touching_distance: 1.0,
+            agreement_by_chance: [0.5, 0.75],
+            threads: None,
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! Instances in a small simulated scene, and what speaks for them against slow references.
+
+use super::evidence::ModelView;
+use super::rim::Rim;
+use super::samples::mean_length;
+use super::scene::SceneSurface;
+use super::*;
+use crate::{FieldPlaces, PointCloud};
+use nalgebra::Vector3;
+use std::f64::consts::PI;
+
+/// Two ellipsoids that meet: half axes and centre of each.
+const BODY: [([f64; 3], [f64; 3]); 2] = [([1.0, 1.3, 1.6], [0.0; 3]), ([0.7, 0.5, 0.9], [0.5, 0.9, 1.0])];
+
+fn inside(point: Vector3<f64>) -> bool {
+    BODY.iter()
+        .any(|(axes, center)| (0..3).map(|k| ((point[k] - center[k]) / axes[k]).powi(2)).sum::<f64>() < 0.999)
+}
+
+/// Points all over the body, and outward normals.
+fn body(count: usize) -> Vec<([f64; 3], Vector3<f64>)> {
+    let golden = PI * (3.0 - 5.0_f64.sqrt());
+    let of_part = |(axes, center): ([f64; 3], [f64; 3])| {
+        (0..count).map(move |i| {
+            let z = 1.0 - (2 * i + 1) as f64 / count as f64;
+            let (sine, cosine) = (golden * i as f64).sin_cos();
+            let on = [(1.0 - z * z).sqrt() * cosine, (1.0 - z * z).sqrt() * sine, z];
+            let normal = Vector3::from_fn(|k, _| on[k] / axes[k]).normalize();
+            ([0, 1, 2].map(|k| center[k] + axes[k] * on[k]), normal)
+        })
+    };
+    let all = BODY.into_iter().flat_map(of_part);
+    all.filter(|(point, _)| !inside(Vector3::from(*point))).collect()
+}
+
+/// A floor with two bodies over it, as it is seen from above: points, and where the bodies are.
+fn scene(viewpoint: [f64; 3]) -> (Vec<[f64; 3]>, [RigidTransform; 2]) {
+    let poses = [
+        RigidTransform::from_rotation_vector([0.4, -1.0, 0.7], [-2.5, 0.3, 0.0]),
+        RigidTransform::from_rotation_vector([1.9, 0.6, -0.8], [2.5, -0.5, 0.2]),
+    ];
+    let is_hidden = |point: &[f64; 3]| {
+        let (point, viewpoint) = (Vector3::from(*point), Vector3::from(viewpoint));
+        (1..60).any(|step| {
+            let between = point + (viewpoint - point) * (0.008 * f64::from(step));
+            poses.iter().any(|pose| inside(pose.inverse().transform_point(between.into()).into()))
+        })
+    };
+    let floor =
+        (0..160 * 110).map(|i| [0.08 * f64::from(i % 160) - 6.4, 0.08 * f64::from(i / 160) - 4.4, -2.4]);
+    let mut points: Vec<[f64; 3]> = floor.collect();
+    for pose in &poses {
+        points.extend(body(6000).into_iter().map(|(point, _)| pose.transform_point(point)));
+    }
+    points.retain(|point| !is_hidden(point));
+    (points, poses)
+}
+
+fn found_in(
+    points: &[[f64; 3]],
+    viewpoint: [f64; 3],
+    threads: Option<usize>,
+) -> Result<Vec<Instance>, Error> {
+    let model: Vec<[f64; 3]> = body(5000).into_iter().map(|(point, _)| point).collect();
+    let monitor = Monitor::default();
+    let model = Model::new(&Scan::new(PointCloud::new_f64(&model)), threads, &monitor)?;
+    assert!(model.is_sided && model.is_closed());
+    let scan = Scan::new(PointCloud::new_f64(points)).seen_from(viewpoint);
+    let settings = FindSettings { threads, ..Default::default() };
+    let found = find_instances(&[&model], &scan, Some(viewpoint), &settings, &monitor)?;
+    assert_eq!(monitor.done(), 2 + FIND_STEPS_PER_MODEL);
+    Ok(found)
+}
+
+#[test]
+fn two_half_seen_bodies_are_found_wherever_the_scene_is_and_on_any_number_of_threads() {
+    let viewpoint = [0.5, -3.0, 14.0];
+    let (points, poses) = scene(viewpoint);
+    let found = found_in(&points, viewpoint, Some(1)).unwrap();
+    assert_eq!(found.len(), 2);
+    for pose in &poses {
+        let error = |instance: &Instance| {
+            let off = (pose.inverse() * instance.T_scene_model).log();
+            off.iter().map(|x| x.abs()).fold(0.0, f64::max)
+        };
+        let best = found.iter().map(error).fold(f64::INFINITY, f64::min);
+        assert!(best < 0.01, "{best}");
+    }
+    assert_eq!(found, found_in(&points, viewpoint, Some(3)).unwrap());
+    let motion = RigidTransform::from_rotation_vector([0.3, 1.2, -0.4], [4e5, 5e6, 100.0]);
+    let moved = found_in(&motion.transform_points(&points), motion.transform_point(viewpoint), None).unwrap();
+    assert_eq!(moved.len(), 2);
+    for here in &found {
+        let off = |there: &Instance| {
+            let off = (here.T_scene_model.inverse() * motion.inverse() * there.T_scene_model).log();
+            off.iter().map(|x| x.abs()).fold(0.0, f64::max)
+        };
+        let there = moved.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
+        assert!(off(there) < 5e-3, "{}", off(there));
+        assert!((here.score - there.score).abs() < 0.05);
+    }
+}
+
+/// A model without signatures: samples with their normals.
+fn model_of(samples: Vec<([f64; 3], Vector3<f64>)>) -> Model {
+    let (samples, normals): (Vec<[f64; 3]>, Vec<[f64; 3]>) =
+        samples.into_iter().map(|(point, normal)| (point, <[f64; 3]>::from(normal))).unzip();
+    Model {
+        points: samples.clone(),
+        center: [0.0; 3],
+        spacing: 0.1,
+        samples,
+        normals,
+        places: FieldPlaces::new(1.0),
+        is_sided: true,
+    }
+}
+
+fn square(columns: std::ops::Range<i32>, rows: std::ops::Range<i32>) -> Vec<([f64; 3], Vector3<f64>)> {
+    let point = |x: i32, y: i32| ([f64::from(x), f64::from(y), 0.0], Vector3::z());
+    rows.flat_map(|y| columns.clone().map(move |x| point(x, y))).collect()
+}
+
+fn surface_of(model: &Model, voxel: f64) -> Arc<SceneSurface> {
+    let all: Vec<usize> = (0..model.samples.len()).collect();
+    Arc::new(SceneSurface::new(model.surface(&all), voxel))
+}
+
+#[test]
+fn a_model_ends_where_the_scene_does() {
+    let model = model_of(square(0..20, 0..20));
+    let samples = model.surface(&(0..400).collect::<Vec<_>>());
+    let rim = Rim::new(&model, &samples, 1.0);
+    let ends = |scene: Vec<([f64; 3], Vector3<f64>)>, is_touching: bool, is_free: bool| {
+        let scene = surface_of(&model_of(scene), 1.0);
+        let free = vec![is_free; scene.samples().len()];
+        rim.ends(&RigidTransform::identity(), &[is_touching; 400], &scene, &free)
+    };
+    assert_eq!(ends(square(0..20, 0..20), true, true), 1.0);
+    assert_eq!(ends(square(-9..29, -9..29), true, true), 0.0, "it lies in a larger square");
+    assert_eq!(ends(square(-9..29, -9..29), false, true), 1.0, "nothing of it is seen");
+    assert_eq!(ends(square(-9..29, -9..29), true, false), 1.0, "another instance is beside it");
+    // To the right the scene goes on: a share of the rim that a slow search counts, too.
+    let wider = square(0..29, 0..20);
+    let (mut asked, mut going_on) = (0.0, 0.0);
+    for (point, _) in square(0..20, 0..20) {
+        for step in 0..8 {
+            let (sine, cosine) = (PI / 4.0 * f64::from(step)).sin_cos();
+            let beside = Vector3::from(point) + Vector3::new(cosine, sine, 0.0) * 3.0;
+            let near = |all: &[([f64; 3], Vector3<f64>)], reach: f64| {
+                all.iter().any(|(other, _)| (Vector3::from(*other) - beside).norm() < reach)
+            };
+            if !near(&square(0..20, 0..20), 1.5) {
+                asked += 1.0;
+                going_on += f64::from(u8::from(near(&wider, 1.0)));
+            }
+        }
+    }
+    let expected: f64 = 1.0 - going_on / asked / 0.8;
+    assert!((ends(wider, true, true) - expected).abs() < 0.02, "{expected}");
+}
+
+#[test]
+fn evidence_without_a_viewpoint_is_what_touches() {
+    let settings = FindSettings::default();
+    let model = model_of(body(1500));
+    let scene: Vec<_> = body(4000).into_iter().filter(|(point, _)| point[0] + point[2] > 0.0).collect();
+    let (voxel, scene) = (0.12, model_of(scene));
+    let view = ModelView::new(&model, surface_of(&scene, voxel), None, usize::MAX, &settings);
+    let off = RigidTransform::from_rotation_vector([0.01, 0.0, -0.02], [0.02, 0.01, 0.0]);
+    let is_free = vec![true; scene.samples.len()];
+    let [there, far] =
+        view.judged(&[off, RigidTransform::from_rotation_vector([0.0; 3], [9.0, 0.0, 0.0])], &is_free)[..]
+    else {
+        panic!("two transforms")
+    };
+    let touches = |(point, normal): (&[f64; 3], &[f64; 3])| {
+        let (point, normal) = (off.transform_point(*point), Vector3::from(off.transform_vector(*normal)));
+        scene.samples.iter().zip(&scene.normals).any(|(other, facing)| {
+            (Vector3::from(*other) - Vector3::from(point)).norm() < voxel
+                && Vector3::from(*facing).dot(&normal) > 0.8
+        })
+    };
+    let touching = model.samples.iter().zip(&model.normals).filter(|pair| touches(*pair)).count();
+    let share = touching as f64 / model.samples.len() as f64;
+    assert!((there.overlap - share).abs() < 2.0 / model.samples.len() as f64, "{} {share}", there.overlap);
+    assert_eq!(there.visible, there.overlap);
+    assert!(there.score > 0.4, "{}", there.score);
+    assert_eq!((far.score, far.overlap), (0.0, 0.0));
+    let none = vec![false; scene.samples.len()];
+    assert_eq!(view.judged(&[off], &none)[0].score, 0.0, "another instance explains all");
+}
+
+#[test]
+fn free_space_speaks_against_what_is_not_there() {
+    let settings = FindSettings::default();
+    let viewpoint = [0.5, -3.0, 14.0];
+    let (points, poses) = scene(viewpoint);
+    let scan = CenteredScan::new(&Scan::new(PointCloud::new_f64(&points)).seen_from(viewpoint));
+    let model = model_of(body(1500));
+    let monitor = Monitor::default();
+    let mut prepared = Scene::new(scan, Some(viewpoint), 1.0, &settings, &monitor).unwrap();
+    let surface = prepared.fine_surface(0.15).unwrap();
+    let center = RigidTransform::from_rotation_vector([0.0; 3], prepared.scan.center);
+    let about = |pose: RigidTransform| center.inverse() * pose;
+    let view = ModelView::new(&model, Arc::clone(&surface), prepared.viewpoint, usize::MAX, &settings);
+    let above = RigidTransform::from_rotation_vector([0.4, -1.0, 0.7], [-2.5, 0.3, 2.0]);
+    let transforms = [about(poses[0]), about(poses[1]), about(above)];
+    let judged = view.judged(&transforms, &vec![true; surface.samples().len()]);
+    assert!(judged[0].score > 0.5 && judged[1].score > 0.5, "{judged:?}");
+    assert!(judged[2].score < 0.0, "{judged:?}");
+}
+
+#[test]
+fn mistakes_are_told() {
+    let monitor = Monitor::default();
+    let none = Scan::new(PointCloud::new(&[]));
+    let few = [[0.0; 3]; 10];
+    let told = |points: &[[f64; 3]]| {
+        let found = Model::new(&Scan::new(PointCloud::new_f64(points)), None, &monitor);
+        found.unwrap_err().to_string()
+    };
+    assert!(told(&few).contains("50 finite points at least, not 10"));
+    assert!(told(&[[1.0; 3]; 100]).contains("one place"));
+    let settings = FindSettings::default();
+    let whole = model_of(body(300));
+    let mut damaged = whole.clone();
+    damaged.normals.pop();
+    assert!(find_instances(&[&whole], &none, None, &settings, &monitor).unwrap().is_empty());
+    let error = find_instances(&[&damaged], &none, None, &settings, &monitor).unwrap_err();
+    assert!(matches!(error, Error::InvalidModel(_)));
+    let stopped = Monitor::default();
+    stopped.cancel();
+    let points: Vec<[f64; 3]> = body(3000).into_iter().map(|(point, _)| point).collect();
+    let scene = Scan::new(PointCloud::new_f64(&points));
+    let error = find_instances(&[&whole], &scene, None, &settings, &stopped).unwrap_err();
+    assert_eq!(error, Error::Cancelled);
+    let sphere = [[1.0_f32, 0.0, 0.0], [-1.0, 0.0, 0.0]];
+    assert_eq!((mean_length(sphere.iter()), mean_length([].iter())), (0.0, 0.0));
+}
