@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,18 +56,9 @@ class Method:
 
 
 def surfsig_surfaces(cloud: surfsig.PointCloud) -> tuple[Found, float]:
-    """Find surfaces with surfsig, without parameters, in this process.
-
-    Raises
-    ------
-    PeerUnavailable
-        When this version of surfsig has no such function.
-    """
-    surfaces: Callable[..., Any] | None = getattr(surfsig, "find_surfaces", None)
-    if surfaces is None:
-        raise PeerUnavailable("this version of surfsig has no find_surfaces()")
+    """Find surfaces with surfsig, without parameters, in this process."""
     start = time.process_time()
-    found = surfaces(cloud)
+    found = surfsig.find_surfaces(cloud)
     seconds = time.process_time() - start
     kinds = [surface.kind for surface in found.surfaces]
     radii = [surface.radius for surface in found.surfaces]

@@ -168,12 +168,20 @@ def test_nothing_is_shown_in_a_pipe(ball: Path, tmp_path: Path) -> None:
     assert (finished.stdout, finished.stderr) == (b"", b"")
 
 
+IN_A_SHELL = """
+import runpy, signal
+# Whoever started the tests may ignore Ctrl-C, and children do as their parents.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+runpy.run_module("surfsig.cli", run_name="__main__", alter_sys=True)
+"""
+
+
 def start_on_terminal(*arguments: object) -> tuple[subprocess.Popen[bytes], int]:
     """Start a command whose stderr is a terminal; give it and the other end of the terminal."""
     pty = pytest.importorskip("pty")
     ours, theirs = pty.openpty()
     environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "100"}
-    command = [sys.executable, "-m", "surfsig.cli", *(str(argument) for argument in arguments)]
+    command = [sys.executable, "-c", IN_A_SHELL, *(str(argument) for argument in arguments)]
     process = subprocess.Popen(command, stderr=theirs, stdout=subprocess.PIPE, env=environment)
     os.close(theirs)
     return process, ours
