@@ -1,5 +1,6 @@
 //! What a call returns, and the text that goes with it.
 
+use crate::arrays::present;
 use std::any::Any;
 use std::cell::RefCell;
 use std::ffi::{CString, c_char};
@@ -86,6 +87,14 @@ pub(crate) fn guarded(body: impl FnOnce() -> Result<(), Failure>) -> surfsig_cod
     let text = CString::new(failure.message.replace('\0', " ")).unwrap_or_default();
     LAST_ERROR.with_borrow_mut(|last| *last = text);
     failure.code
+}
+
+/// Changes options that must not be null.
+pub(crate) fn set<T>(
+    options: Option<&mut T>,
+    change: impl FnOnce(&mut T) -> Result<(), Failure>,
+) -> surfsig_code {
+    guarded(|| change(present(options, "options")?))
 }
 
 /// One line about the last call of this thread that failed; empty where none has. Never to be freed; valid

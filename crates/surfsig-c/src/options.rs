@@ -1,7 +1,7 @@
 //! How an extraction is done. The object is opaque, so that it can grow without a new binary interface.
 
-use crate::arrays::{array, position, present};
-use crate::code::{Failure, guarded, surfsig_code};
+use crate::arrays::{array, position};
+use crate::code::{Failure, set, surfsig_code};
 use crate::progress::{Progress, surfsig_progress};
 use std::ffi::{c_int, c_void};
 use surfsig::{
@@ -372,12 +372,4 @@ pub unsafe extern "C" fn surfsig_options_set_progress(
         options.progress = unsafe { Progress::new(progress, data) };
         Ok(())
     })
-}
-
-/// Changes options that must not be null.
-fn set(
-    options: Option<&mut surfsig_options>,
-    change: impl FnOnce(&mut surfsig_options) -> Result<(), Failure>,
-) -> surfsig_code {
-    guarded(|| change(present(options, "options")?))
 }

@@ -2,7 +2,7 @@
 
 use crate::arrays::{array, numbers, present, put};
 use crate::cloud::{given, surfsig_cloud};
-use crate::code::{Failure, guarded, surfsig_code};
+use crate::code::{Failure, guarded, set, surfsig_code};
 use crate::options::thread_count;
 use crate::progress::{Progress, surfsig_progress};
 use crate::transform::surfsig_transform;
@@ -258,12 +258,4 @@ pub unsafe extern "C" fn surfsig_register(
     };
     // SAFETY: the caller gives room for a result, or null.
     guarded(|| unsafe { put(registration, found()?, "registration") })
-}
-
-/// Changes options that must not be null.
-fn set(
-    options: Option<&mut surfsig_registration_options>,
-    change: impl FnOnce(&mut surfsig_registration_options) -> Result<(), Failure>,
-) -> surfsig_code {
-    guarded(|| change(present(options, "options")?))
 }

@@ -1,7 +1,7 @@
 //! How surfaces are found.
 
-use crate::arrays::{array, present};
-use crate::code::{Failure, guarded, surfsig_code};
+use crate::arrays::array;
+use crate::code::{Failure, set, surfsig_code};
 use crate::kind::kind_of;
 use crate::options::thread_count;
 use crate::progress::{Progress, surfsig_progress};
@@ -111,12 +111,4 @@ pub unsafe extern "C" fn surfsig_surface_options_set_progress(
         options.progress = unsafe { Progress::new(progress, data) };
         Ok(())
     })
-}
-
-/// Changes options that must not be null.
-fn set(
-    options: Option<&mut surfsig_surface_options>,
-    change: impl FnOnce(&mut surfsig_surface_options) -> Result<(), Failure>,
-) -> surfsig_code {
-    guarded(|| change(present(options, "options")?))
 }

@@ -1,19 +1,15 @@
 //! Extraction, watched from Python.
 
+use crate::watched::watched;
 use crate::{rows, to_python};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::Duration;
 use surfsig::{
     ExtractOptions, Extraction, FitAxes, FitKind, Monitor, Neighborhood, Offsets, PointCloud, Queries,
     Radius, Resolution,
 };
-
-/// How often the interpreter is asked for signals and told the progress.
-const WATCH_INTERVAL: Duration = Duration::from_millis(50);
 
 /// An (n, 3) array of either precision, contiguous.
 #[derive(FromPyObject)]
@@ -133,44 +129,10 @@ pub fn extract<'py>(
     let job = Job::of(radius, neighbors)?;
     let directions = directions.as_ref().map(rows::<f32, 3>).transpose()?;
     let options = ExtractOptions { axes, fit, viewpoint, directions, robust, threads, instruction_set: None };
-    let monitor = Monitor::default();
     let total = queries.len(&cloud) * job.counts();
-    let run = || job.run(&cloud, &queries, &options, &monitor);
-    let report = || -> PyResult<()> {
-        Python::attach(|py| {
-            py.check_signals()?;
-            progress.as_ref().map_or(Ok(()), |call| call.call1(py, (monitor.done(), total)).map(|_| ()))
-        })
-    };
-    let extractions = py.detach(|| watched(run, report, || monitor.cancel()))?;
-    report()?;
+    let work = |monitor: &Monitor| job.run(&cloud, &queries, &options, monitor);
+    let extractions = watched(py, Some(total), progress.as_ref(), work)?;
     extractions.into_iter().map(|extraction| to_arrays(py, extraction)).collect()
-}
-
-/// Runs the work on a thread of its own, so that this one can answer Ctrl-C.
-pub fn watched<T: Send>(
-    run: impl FnOnce() -> Result<T, surfsig::Error> + Send,
-    report: impl Fn() -> PyResult<()>,
-    cancel: impl Fn(),
-) -> PyResult<T> {
-    std::thread::scope(|scope| {
-        let (sender, receiver) = channel();
-        scope.spawn(move || {
-            // Nobody listens only where the interpreter has already given up.
-            let _ = sender.send(run());
-        });
-        loop {
-            match receiver.recv_timeout(WATCH_INTERVAL) {
-                Ok(result) => return result.map_err(to_python),
-                Err(RecvTimeoutError::Timeout) => report().inspect_err(|_| cancel())?,
-                Err(RecvTimeoutError::Disconnected) => {
-                    return Err(pyo3::exceptions::PyRuntimeError::new_err(
-                        "the extraction's thread panicked",
-                    ));
-                }
-            }
-        }
-    })
 }
 
 /// Moves the columns into NumPy arrays, without a copy.

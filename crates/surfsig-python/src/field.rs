@@ -1,6 +1,7 @@
 //! Field signatures, for Python.
 
-use crate::extract::{At, Points, watched};
+use crate::extract::{At, Points};
+use crate::watched::watched;
 use crate::{invalid_input, rows, to_python};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -35,25 +36,17 @@ pub fn field_signatures<'py>(
     let radius = Radius::new(radius).map_err(to_python)?;
     let directions = directions.as_ref().map(rows::<f32, 3>).transpose()?;
     let options = FieldOptions { viewpoint, directions, threads, instruction_set: None };
-    let monitor = Monitor::default();
     let total = queries.len(&cloud);
-    let report = || -> PyResult<()> {
-        Python::attach(|py| {
-            py.check_signals()?;
-            progress.as_ref().map_or(Ok(()), |call| call.call1(py, (monitor.done(), total)).map(|_| ()))
-        })
-    };
-    let cancel = || monitor.cancel();
     let arrays = PyDict::new(py);
     if pools {
-        let run = || surfsig::field_pools(&cloud, radius, &queries, &options, &monitor);
-        let found = py.detach(|| watched(run, report, cancel))?;
+        let work = |monitor: &Monitor| surfsig::field_pools(&cloud, radius, &queries, &options, monitor);
+        let found = watched(py, Some(total), progress.as_ref(), work)?;
         let sums: Vec<f32> = found.values.iter().flat_map(|pool| pool.as_flattened()).copied().collect();
         arrays.set_item("pools", table(py, sums, total)?)?;
         places(&arrays, found)?;
     } else {
-        let run = || surfsig::field_signatures(&cloud, radius, &queries, &options, &monitor);
-        let found = py.detach(|| watched(run, report, cancel))?;
+        let work = |monitor: &Monitor| surfsig::field_signatures(&cloud, radius, &queries, &options, monitor);
+        let found = watched(py, Some(total), progress.as_ref(), work)?;
         let mut vectors = Vec::with_capacity(total * FIELD_SIGNATURE);
         let mut phases = Vec::with_capacity(total * 14 * FIELD_PHASES);
         for signature in &found.values {
@@ -64,7 +57,6 @@ pub fn field_signatures<'py>(
         arrays.set_item("phases", table(py, phases, total)?)?;
         places(&arrays, found)?;
     }
-    report()?;
     Ok(arrays)
 }
 
@@ -92,16 +84,8 @@ pub fn field_keypoints<'py>(
     if let Some(count) = count {
         keypoints.count = count;
     }
-    let monitor = Monitor::default();
-    let report = || -> PyResult<()> {
-        Python::attach(|py| {
-            py.check_signals()?;
-            let done = monitor.done();
-            progress.as_ref().map_or(Ok(()), |call| call.call1(py, (done, done)).map(|_| ()))
-        })
-    };
-    let run = || surfsig::find_keypoints(&cloud, radius, &keypoints, &options, &monitor);
-    let found = py.detach(|| watched(run, report, || monitor.cancel()))?;
+    let work = |monitor: &Monitor| surfsig::find_keypoints(&cloud, radius, &keypoints, &options, monitor);
+    let found = watched(py, None, progress.as_ref(), work)?;
     let arrays = PyDict::new(py);
     let total = found.len();
     arrays.set_item("indices", found.indices.into_pyarray(py))?;

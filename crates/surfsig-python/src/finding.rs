@@ -1,10 +1,10 @@
 //! Instances of models, for Python.
 
-use crate::extract::watched;
 use crate::field::{PlacesArgument, table};
 use crate::registration::{ScanArgument, free_directions_to_python};
 use crate::rows;
 use crate::settings::settings_class;
+use crate::watched::watched;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -101,10 +101,8 @@ pub fn prepare_model<'py>(
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let scan = scan.scan()?;
-    let monitor = Monitor::default();
-    let run = || Model::new(&scan, threads, &monitor);
-    let check = || Python::attach(|py| py.check_signals());
-    let model = py.detach(|| watched(run, check, || monitor.cancel()))?;
+    let work = |monitor: &Monitor| Model::new(&scan, threads, monitor);
+    let model = watched(py, None, None, work)?;
     let result = PyDict::new(py);
     let matrix = |points: Vec<[f64; 3]>| {
         let count = points.len();
@@ -151,18 +149,11 @@ pub fn find_instances<'py>(
     let mut settings = settings.map_or_else(surfsig::FindSettings::default, |settings| settings.core);
     settings.min_score = min_score;
     settings.threads = threads;
-    let monitor = Monitor::default();
     let total = 2 + FIND_STEPS_PER_MODEL * models.len();
-    let report = || -> PyResult<()> {
-        Python::attach(|py| {
-            py.check_signals()?;
-            let call = |call: &Py<PyAny>| call.call1(py, (monitor.done(), total)).map(|_| ());
-            progress.as_ref().map_or(Ok(()), call)
-        })
+    let work = |monitor: &Monitor| {
+        surfsig::find_instances(&models, &scene, free_space_viewpoint, &settings, monitor)
     };
-    let run = || surfsig::find_instances(&models, &scene, free_space_viewpoint, &settings, &monitor);
-    let found = py.detach(|| watched(run, report, || monitor.cancel()))?;
-    report()?;
+    let found = watched(py, Some(total), progress.as_ref(), work)?;
     found.into_iter().map(|instance| to_python(py, instance)).collect()
 }
 

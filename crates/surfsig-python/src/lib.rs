@@ -13,6 +13,7 @@ mod python_file;
 mod registration;
 mod settings;
 mod surfaces;
+mod watched;
 
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;

@@ -1,7 +1,7 @@
 //! Distances between neighbours, for Python.
 
-use crate::extract::watched;
 use crate::rows;
+use crate::watched::watched;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use surfsig::Monitor;
@@ -17,16 +17,7 @@ pub fn mean_neighbor_distances<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let points = rows::<f64, 3>(&points)?;
-    let monitor = Monitor::default();
-    let report = || -> PyResult<()> {
-        Python::attach(|py| {
-            py.check_signals()?;
-            let call = |call: &Py<PyAny>| call.call1(py, (monitor.done(), points.len())).map(|_| ());
-            progress.as_ref().map_or(Ok(()), call)
-        })
-    };
-    let run = || surfsig::mean_neighbor_distances(points, count, threads, &monitor);
-    let found = py.detach(|| watched(run, report, || monitor.cancel()))?;
-    report()?;
+    let work = |monitor: &Monitor| surfsig::mean_neighbor_distances(points, count, threads, monitor);
+    let found = watched(py, Some(points.len()), progress.as_ref(), work)?;
     Ok(found.into_pyarray(py))
 }

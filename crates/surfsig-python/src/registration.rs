@@ -1,7 +1,8 @@
 //! Registration of scans, for Python.
 
-use crate::extract::{Points, watched};
+use crate::extract::Points;
 use crate::settings::settings_class;
+use crate::watched::watched;
 use crate::{invalid_input, rows};
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
@@ -90,17 +91,8 @@ pub fn register<'py>(
     if let Some(count) = keypoints {
         settings.keypoints = count;
     }
-    let monitor = Monitor::default();
-    let report = || -> PyResult<()> {
-        Python::attach(|py| {
-            py.check_signals()?;
-            let call = |call: &Py<PyAny>| call.call1(py, (monitor.done(), REGISTRATION_STEPS)).map(|_| ());
-            progress.as_ref().map_or(Ok(()), call)
-        })
-    };
-    let run = || surfsig::register(&source, &target, start.as_ref(), &settings, &monitor);
-    let found = py.detach(|| watched(run, report, || monitor.cancel()))?;
-    report()?;
+    let work = |monitor: &Monitor| surfsig::register(&source, &target, start.as_ref(), &settings, monitor);
+    let found = watched(py, Some(REGISTRATION_STEPS), progress.as_ref(), work)?;
     let result = PyDict::new(py);
     let matrix = found.T_target_source.map(|transform| transform.to_matrix().to_vec());
     result.set_item("T_target_source", matrix)?;
@@ -149,9 +141,7 @@ pub fn consistent_directions<'py>(
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let points = rows::<f64, 3>(&points)?;
-    let monitor = Monitor::default();
-    let run = || surfsig::consistent_directions(points, voxel, threads, &monitor);
-    let check = || Python::attach(|py| py.check_signals());
-    let found = py.detach(|| watched(run, check, || monitor.cancel()))?;
+    let work = |monitor: &Monitor| surfsig::consistent_directions(points, voxel, threads, monitor);
+    let found = watched(py, None, None, work)?;
     Ok(found.into_flattened().into_pyarray(py).reshape([points.len(), 3])?.into_any())
 }

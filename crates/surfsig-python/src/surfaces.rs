@@ -1,7 +1,8 @@
 //! The surfaces of a scan, for Python.
 
-use crate::extract::{Points, watched};
+use crate::extract::Points;
 use crate::primitive::kind_of;
+use crate::watched::watched;
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -25,16 +26,8 @@ pub fn find_surfaces<'py>(
     let cloud = points.cloud(origin)?;
     let kinds = kinds.iter().map(|name| kind_of(name)).collect::<PyResult<_>>()?;
     let options = SurfaceOptions { fewest: min_points, noise, kinds, threads };
-    let monitor = Monitor::default();
-    let report = || -> PyResult<()> {
-        Python::attach(|py| {
-            py.check_signals()?;
-            progress.as_ref().map_or(Ok(()), |call| call.call1(py, (monitor.done(), cloud.len())).map(|_| ()))
-        })
-    };
-    let run = || surfsig::find_surfaces(&cloud, &options, &monitor);
-    let found = py.detach(|| watched(run, report, || monitor.cancel()))?;
-    report()?;
+    let work = |monitor: &Monitor| surfsig::find_surfaces(&cloud, &options, monitor);
+    let found = watched(py, Some(cloud.len()), progress.as_ref(), work)?;
     let surfaces = found.surfaces.iter().map(|surface| {
         let entry = PyDict::new(py);
         entry.set_item("kind", surface.kind.name())?;

@@ -62,6 +62,7 @@ mod shells;
 mod simd;
 mod similarity;
 mod spacing;
+mod statistics;
 mod status;
 mod surfaces;
 mod tensor;

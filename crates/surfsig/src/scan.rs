@@ -1,6 +1,7 @@
 //! A scan: points, and what says on which side of their surface the sensor was.
 
 use crate::PointCloud;
+use crate::statistics::median;
 use crate::voxels::Voxels;
 use nalgebra::Vector3;
 
@@ -141,28 +142,9 @@ impl CenteredScan {
     }
 }
 
-/// The middle one of numbers, or the mean of the middle two; `None` of none.
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return None;
-    }
-    let even = values.len().is_multiple_of(2);
-    let (below, &mut upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-    let lower = if even { below.iter().copied().fold(f64::NEG_INFINITY, f64::max) } else { upper };
-    Some(0.5 * (lower + upper))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn medians_of_odd_and_even_counts() {
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
-        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
-        assert_eq!(median(vec![]), None);
-    }
 
     #[test]
     fn a_scan_far_away_is_the_same_scan_about_its_centre() {

@@ -2,7 +2,7 @@
 
 use crate::kd_tree::KdTree;
 use crate::random::some_of;
-use crate::scan::median;
+use crate::statistics::median;
 use rayon::prelude::*;
 
 /// Points that tell the spacing of all.

@@ -4,6 +4,7 @@ use crate::fit::paraboloid::{Paraboloids, UNKNOWNS};
 use crate::members::Members;
 use crate::moments::Moments;
 use crate::simd::InstructionSet;
+use crate::statistics::DEVIATIONS_PER_MEDIAN;
 
 /// Passes after which the choice of points stands; four are usual.
 pub(super) const MAX_PASSES: usize = 12;
@@ -11,9 +12,6 @@ pub(super) const MAX_PASSES: usize = 12;
 /// A point this many standard deviations from the surface is an outlier; of a hundred thousand normal ones
 /// 270 are.
 const FAR: f64 = 3.0;
-
-/// Standard deviations per median of the absolute values, for normal noise.
-const DEVIATIONS_PER_MEDIAN: f64 = 1.4826;
 
 /// Distances, in radii, that rounding alone makes.
 const ROUNDING: f64 = 1e-6;

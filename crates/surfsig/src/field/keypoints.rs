@@ -2,7 +2,7 @@
 
 use super::{FieldOptions, FieldPlaces, distinctiveness::distinctiveness, signatures_within};
 use crate::kd_tree::KdTree;
-use crate::scan::median;
+use crate::statistics::median;
 use crate::{Error, Monitor, PointCloud, Queries, Radius, voxel_representatives, with_threads};
 
 /// Of the candidates, the share from which spread keypoints are chosen: the most distinctive.

@@ -5,7 +5,8 @@ use crate::extract::extract_within;
 use crate::field::signatures_within;
 use crate::orientation::directions_within;
 use crate::random::some_of;
-use crate::scan::{CenteredScan, median};
+use crate::scan::CenteredScan;
+use crate::statistics::median;
 use crate::voxels::voxel_of;
 use crate::{
     Error, ExtractOptions, FieldOptions, FieldPlaces, Monitor, Queries, Radius, voxel_representatives,

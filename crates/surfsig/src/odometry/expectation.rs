@@ -2,7 +2,7 @@
 
 use super::scan_alignment::ScanAlignment;
 use super::settings::ExpectationSettings;
-use crate::scan::median;
+use crate::statistics::median;
 use std::collections::VecDeque;
 
 /// What the last scans with a pose did; all shares depend on the sensor and its surroundings.

@@ -12,7 +12,6 @@ mod result;
 mod scale;
 mod scan_alignment;
 mod settings;
-mod statistics;
 mod thinned_scan;
 mod tracker;
 mod voxel_index;

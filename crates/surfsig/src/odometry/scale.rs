@@ -1,8 +1,8 @@
 //! Lengths that a sequence is worked with, taken from its first scan.
 
 use super::settings::ScaleSettings;
-use super::statistics::quantile;
-use crate::scan::median;
+use crate::statistics::median;
+use crate::statistics::quantile;
 use rustc_hash::FxHashSet;
 
 /// Halvings of the interval in which the voxel is looked for: 1e-6 to 1 of the scan's extent, to one part in a million.

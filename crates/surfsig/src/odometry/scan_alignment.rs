@@ -6,12 +6,10 @@ use super::settings::ScanAlignmentSettings;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
 use crate::alignment::{GicpSettings, blocks, clustered_covariance, gicp_with, solve_determined};
-use crate::scan::median;
+use crate::statistics::{DEVIATIONS_PER_MEDIAN, median};
 use nalgebra::{Matrix6, Vector3, Vector6};
 use std::collections::BTreeMap;
 
-/// Standard deviations of a normal distribution in the median of its absolute values.
-const DEVIATIONS_IN_MEDIAN: f64 = 1.4826;
 /// Eigenvalues of the normal matrix below this share of the largest are rounding: no step goes there.
 const ROUNDING: f64 = 1e-9;
 
@@ -129,7 +127,7 @@ impl PointToPlane {
             .map(|(other, point)| other.and_then(|(index, _)| residual(index, point)))
             .collect();
         let sizes: Vec<f64> = residuals.iter().flatten().map(|residual| residual.abs()).collect();
-        let deviation = DEVIATIONS_IN_MEDIAN * median(sizes)?;
+        let deviation = DEVIATIONS_PER_MEDIAN * median(sizes)?;
         let limit = settings.max_residual.min(settings.max_deviation * deviation.max(settings.min_deviation));
         let beside = settings.explained_distance * settings.explained_distance;
         let mut plane = Self {

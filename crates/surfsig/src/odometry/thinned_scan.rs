@@ -4,7 +4,7 @@ use super::scale::{distances, median_point};
 use super::settings::OdometrySettings;
 use crate::Scan;
 use crate::alignment::GicpCloud;
-use crate::scan::median;
+use crate::statistics::median;
 use crate::visibility::SphericalRangeImage;
 use crate::voxels::voxel_means;
 

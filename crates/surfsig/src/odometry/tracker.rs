@@ -7,9 +7,9 @@ use super::result::ScanStatus;
 use super::scale::{Scale, distances};
 use super::scan_alignment::{ScanAlignment, align};
 use super::settings::OdometrySettings;
-use super::statistics::quantile;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
+use crate::statistics::quantile;
 use nalgebra::{Matrix6, Vector3};
 
 /// Share of a scan's points that the map's range is taken from.

@@ -4,8 +4,9 @@
 //! a sensor's depth, a lens, smoothing in the camera) bends a surface instead, and would make two of one.
 
 use super::growth::Region;
-use super::scene::{Scene, middle};
+use super::scene::Scene;
 use crate::primitive::{Vector, design_effect};
+use crate::statistics::upper_median;
 
 /// Surfaces that are grown on trial, from seeds spread evenly over those whose noise is from a tenth to six tenths.
 const TRIALS: usize = 48;
@@ -64,7 +65,8 @@ pub(super) fn learn(
         if deviations.len() < FEWEST {
             return round > 0;
         }
-        let (deviation, alike) = (middle(deviations).unwrap_or(1.0), middle(alike).unwrap_or(1.0));
+        let (deviation, alike) =
+            (upper_median(deviations).unwrap_or(1.0), upper_median(alike).unwrap_or(1.0));
         if alike < ALIKE {
             return true;
         }

@@ -5,6 +5,7 @@ use super::likeness::Likeness;
 use crate::extract::extract_within;
 use crate::fit::{FitKind, FitUsed};
 use crate::primitive::{Chart, Vector};
+use crate::statistics::upper_median;
 use crate::{
     Error, ExtractOptions, Extraction, Monitor, Neighborhood, PointCloud, Queries, Radius,
     voxel_representatives,
@@ -133,7 +134,7 @@ impl Scene {
     /// of a sensor that measures depth in steps.
     fn look_across_steps(&mut self, monitor: &Monitor) -> Result<(), Error> {
         let known = self.noise.iter().copied().filter(|noise| noise.is_finite()).collect();
-        match middle(known) {
+        match upper_median(known) {
             Some(typical) if !self.is_noiseless(typical) => {
                 let smooth = |&point: &u32| self.noise[point as usize] < STEP * typical;
                 let smooth: Vec<u32> = self.chosen.iter().copied().filter(smooth).collect();
@@ -309,10 +310,11 @@ impl Surroundings {
         local.take_over(on_lines.iter().map(|&i| i as usize).zip(0..), &wider);
         let mut strides = vec![1_u8; positions.len()];
         on_lines.iter().for_each(|&i| strides[i as usize] = ACROSS);
-        let typical = middle(local.radii.iter().map(|&r| f64::from(r)).filter(|r| *r > 0.0).collect());
+        let typical = upper_median(local.radii.iter().map(|&r| f64::from(r)).filter(|r| *r > 0.0).collect());
         let Some(typical) = typical else { return Ok(None) };
         let graph = Graph::new(positions, &strides, Radius::new(typical)?, monitor)?;
-        let spacing = middle(graph.nearest.iter().map(|&d| f64::from(d)).filter(|d| d.is_finite()).collect());
+        let spacing =
+            upper_median(graph.nearest.iter().map(|&d| f64::from(d)).filter(|d| d.is_finite()).collect());
         Ok(Some(Self { local, graph, typical, spacing: spacing.unwrap_or(0.0) }))
     }
 }
@@ -330,15 +332,6 @@ fn around(
 
 fn is_line(local: &Extraction, entry: usize) -> bool {
     f64::from(local.linearity[entry]) > LINE
-}
-
-/// The median, or `None` of nothing.
-pub(super) fn middle(mut values: Vec<f64>) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let half = values.len() / 2;
-    Some(*values.select_nth_unstable_by(half, f64::total_cmp).1)
 }
 
 /// Which points have been seen; cleared in no time.
