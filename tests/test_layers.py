@@ -44,7 +44,17 @@ PYTHON_EXCEPTIONS = {
 
 RUST_FLOORS = (
     ("error",),
-    ("statistics", "geometry", "similarity", "point_cloud", "random", "threads", "moments", "monitor", "status"),
+    (
+        "statistics",
+        "geometry",
+        "similarity",
+        "point_cloud",
+        "random",
+        "threads",
+        "moments",
+        "monitor",
+        "status",
+    ),
     ("lattice", "resolution", "depth_image", "visibility", "kd_tree", "voxels"),
     ("simd",),
     ("cell_index", "tensor", "scan", "neighbor_distances"),

@@ -370,7 +370,7 @@ class DepthImage:
         points: SurfacePlaces,
         own: NDArray[np.bool_],
         *,
-        eye: Sequence[float],
+        viewpoint: Sequence[float],
         spacing: float,
         reach: float,
         floors: SurfacePlaces,

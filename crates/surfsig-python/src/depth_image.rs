@@ -35,12 +35,12 @@ pub struct DepthImage {
 impl DepthImage {
     #[new]
     #[expect(clippy::too_many_arguments, reason = "keywords of the Python class")]
-    #[pyo3(signature = (points, own, *, eye, spacing, reach, floors, second=None))]
+    #[pyo3(signature = (points, own, *, viewpoint, spacing, reach, floors, second=None))]
     fn new(
         py: Python<'_>,
         points: &SurfacePlaces,
         own: PyReadonlyArray1<'_, bool>,
-        eye: [f64; 3],
+        viewpoint: [f64; 3],
         spacing: f64,
         reach: f64,
         floors: &SurfacePlaces,
@@ -50,7 +50,7 @@ impl DepthImage {
         if own.len() != points.places.len() {
             return Err(invalid_input("expected one flag for each point"));
         }
-        let make = || surfsig::DepthImage::new(&points.places, own, eye, spacing, reach, second);
+        let make = || surfsig::DepthImage::new(&points.places, own, viewpoint, spacing, reach, second);
         Ok(Self { image: py.detach(make).standing_on(&floors.places) })
     }
 

@@ -82,7 +82,7 @@ struct Pixel {
 #[derive(Debug, Clone)]
 pub struct DepthImage {
     axes: [[f32; 3]; 3],
-    /// From the eye to the origin.
+    /// From the viewpoint to the origin.
     distance: f32,
     /// Pixels per unit of slope.
     scale: f32,
@@ -107,17 +107,17 @@ impl DepthImage {
     pub fn new(
         points: &[SurfacePlace],
         own: &[bool],
-        eye: [f64; 3],
+        viewpoint: [f64; 3],
         spacing: f64,
         reach: f64,
         second: Option<[f64; 3]>,
     ) -> Self {
         assert_eq!(points.len(), own.len(), "one flag for each point");
-        let distance = eye.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let distance = viewpoint.iter().map(|x| x * x).sum::<f64>().sqrt();
         let pixel = spacing.max(2.0 * reach / MOST_PIXELS);
         let side = (2.0 * reach / pixel).ceil() as usize + 1;
         let mut image = Self {
-            axes: axes_towards(eye.map(|x| -x / distance)),
+            axes: axes_towards(viewpoint.map(|x| -x / distance)),
             distance: distance as f32,
             scale: (distance / pixel) as f32,
             side,

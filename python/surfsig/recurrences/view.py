@@ -87,7 +87,7 @@ def view_of(
     image = DepthImage(
         surface(around),
         np.isin(around, piece),
-        eye=(viewpoint - middle).tolist(),
+        viewpoint=(viewpoint - middle).tolist(),
         spacing=spacing,
         reach=reach,
         floors=SurfacePlaces(*(np.ascontiguousarray(part) for part in floors.swapaxes(0, 1))),

@@ -14,7 +14,7 @@ from surfsig.point_cloud import PointCloud, position_array
 from surfsig.progress import ProgressCallback
 from surfsig.resolution import warn_if_surface_is_lost
 from surfsig.shapes.growth import grown
-from surfsig.shapes.robust import settled
+from surfsig.shapes.robust import fitted_to_inliers
 from surfsig.shapes.surface import KINDS, Kind, Surface, measured_surface
 
 Array = NDArray[np.float64]
@@ -155,7 +155,7 @@ def _fit(
     if radius is not None and place is None:
         raise InvalidInputError("radius is that of the ball around near: give near, too")
     if place is None:
-        found = settled(kind, points, robust=robust, progress=tell)
+        found = fitted_to_inliers(kind, points, robust=robust, progress=tell)
     else:
         start = None if radius is None else positive_length(radius, "radius")
         position = position_array(place, "near")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from surfsig import _surfsig
 from surfsig.progress import Progress, ProgressCallback
-from surfsig.shapes.robust import MAX_PASSES, Array, near, rounding_of, settled
+from surfsig.shapes.robust import MAX_PASSES, Array, fitted_to_inliers, near, rounding_of
 from surfsig.shapes.surface import Kind
 from surfsig.threads import map_in_threads
 
@@ -124,7 +124,7 @@ def _starts(points: Array, place: Array, radius: float | None) -> list[NDArray[n
 
 
 def _from_seeds(kind: Kind, points: Array, seeds: NDArray[np.intp]) -> Grown | None:
-    start = settled(kind, points[seeds], robust=True)
+    start = fitted_to_inliers(kind, points[seeds], robust=True)
     if start is None:
         return None
     surface, kept = start

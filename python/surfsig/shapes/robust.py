@@ -24,7 +24,7 @@ MAX_PASSES = 50
 """Passes after which the choice of points is taken as it is; some ten are usual."""
 
 
-def settled(
+def fitted_to_inliers(
     kind: Kind, points: Array, *, robust: bool, progress: ProgressCallback | None = None
 ) -> tuple[_surfsig.Primitive, NDArray[np.bool_]] | None:
     """Fit a surface, and say which points count; `robust` leaves out those that are far from it.

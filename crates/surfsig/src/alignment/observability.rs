@@ -2,8 +2,9 @@
 //!
 //! Gelfand, Guibas: Shape segmentation using local slippage analysis (SGP 2004).
 
+use super::least_squares::LinearisedDistances;
 use crate::geometry::RigidTransform;
-use nalgebra::{Matrix6, SMatrix, SVD, Vector3, Vector6};
+use nalgebra::{SMatrix, SVD, Vector3, Vector6};
 
 /// Largest root mean square of the residuals that an unobservable motion makes, over that of its points' paths: what
 /// noise and small features leave of a cylinder or a plane in scans.
@@ -72,19 +73,10 @@ pub fn free_directions(points: &[[f64; 3]], normals: &[[f64; 3]]) -> Vec<FreeDir
     if points.is_empty() {
         return Vec::new();
     }
-    let count = points.len() as f64;
-    let center = points.iter().map(|point| Vector3::from(*point)).sum::<Vector3<f64>>() / count;
-    let square =
-        points.iter().map(|point| (Vector3::from(*point) - center).norm_squared()).sum::<f64>() / count;
-    // Rotations in units of this length move points as far as translations do.
-    let unit = if square > 0.0 { square.sqrt() } else { 1.0 };
-    let mut information = Matrix6::zeros();
-    for (point, normal) in points.iter().zip(normals) {
-        let normal = Vector3::from(*normal);
-        let rotational = ((Vector3::from(*point) - center) / unit).cross(&normal);
-        let row = Vector6::new(rotational.x, rotational.y, rotational.z, normal.x, normal.y, normal.z);
-        information += row * row.transpose() / count;
-    }
+    let rows: Vec<_> =
+        points.iter().zip(normals).map(|(p, n)| (Vector3::from(*p), Vector3::from(*n), 0.0)).collect();
+    let LinearisedDistances { center, unit, information, .. } = LinearisedDistances::new(&rows);
+    let information = information / points.len() as f64;
     let eigen = information.symmetric_eigen();
     let mut numbers: Vec<usize> = (0..6).filter(|&k| eigen.eigenvalues[k] <= UNOBSERVABLE.powi(2)).collect();
     numbers.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));

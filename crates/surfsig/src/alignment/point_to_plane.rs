@@ -1,10 +1,10 @@
 //! Many transforms of one surface, each fitted to another by the distances of points from tangent planes.
 
-use super::least_squares::solve_determined;
+use super::least_squares::LinearisedDistances;
 use crate::depth_image::{ALIKE, SurfacePlace, dot};
 use crate::geometry::RigidTransform;
 use crate::kd_tree::KdTree;
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Correspondences without which a transform stays as it is: twice the unknowns.
@@ -74,36 +74,18 @@ impl OrientedSurface {
         source: &[SurfacePlace],
         max_distance: f64,
     ) -> Option<RigidTransform> {
-        let correspondences: Vec<(Vector3<f64>, &SurfacePlace)> = source
-            .iter()
-            .filter_map(|point| {
-                let moved = transformed(transform, point);
-                let target = &self.points[self.nearest(&moved, max_distance)?];
-                Some((vector(&moved.place), target))
-            })
-            .collect();
-        if correspondences.len() < MIN_CORRESPONDENCES {
+        let correspondence = |point: &SurfacePlace| {
+            let moved = transformed(transform, point);
+            let target = &self.points[self.nearest(&moved, max_distance)?];
+            let [point, foot, normal] = [moved.place, target.place, target.normal].map(vector);
+            Some((point, normal, normal.dot(&(point - foot))))
+        };
+        let rows: Vec<_> = source.iter().filter_map(correspondence).collect();
+        if rows.len() < MIN_CORRESPONDENCES {
             return None;
         }
-        let count = correspondences.len() as f64;
-        let center = correspondences.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / count;
-        // Rotations in units of this length move points as far as translations do.
-        let square =
-            correspondences.iter().map(|(point, _)| (point - center).norm_squared()).sum::<f64>() / count;
-        let unit = if square > 0.0 { square.sqrt() } else { 1.0 };
-        let mut information = Matrix6::zeros();
-        let mut gradient = Vector6::zeros();
-        for (point, target) in &correspondences {
-            let normal = vector(&target.normal);
-            let rotational = ((point - center) / unit).cross(&normal);
-            let row = Vector6::new(rotational.x, rotational.y, rotational.z, normal.x, normal.y, normal.z);
-            information += row * row.transpose();
-            gradient += row * normal.dot(&(vector(&target.place) - point));
-        }
-        let change = solve_determined(information, &gradient, UNOBSERVABLE);
-        let [x, y, z, translation @ ..] = <[f64; 6]>::from(change);
-        let rotation_vector = [x, y, z].map(|angle| angle / unit);
-        Some(RigidTransform::about(center.into(), rotation_vector, translation) * *transform)
+        let (step, _) = LinearisedDistances::new(&rows).step(UNOBSERVABLE);
+        Some(step * *transform)
     }
 }
 
@@ -128,7 +110,7 @@ pub(crate) fn cosine_towards(point: &SurfacePlace, other: [f32; 3]) -> f32 {
     dot(&point.normal, &towards) / dot(&towards, &towards).sqrt()
 }
 
-fn vector(v: &[f32; 3]) -> Vector3<f64> {
+fn vector(v: [f32; 3]) -> Vector3<f64> {
     Vector3::from(v.map(f64::from))
 }
 

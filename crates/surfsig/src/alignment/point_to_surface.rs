@@ -1,7 +1,7 @@
 //! The last steps of a transform, by the distances of points from a surface; and how sure it then is.
 
 use super::clustered_covariance::{blocks, clustered_covariance};
-use super::least_squares::{pseudo_inverse, solve_determined};
+use super::least_squares::{LinearisedDistances, pseudo_inverse};
 use crate::geometry::RigidTransform;
 use crate::kd_tree::KdTree;
 use crate::statistics::{DEVIATIONS_PER_MEDIAN, median};
@@ -225,49 +225,31 @@ impl TargetSurface {
                 return None;
             }
             let system = System::new(&inliers, &moved);
-            let change = -solve_determined(system.information, &system.gradient, UNDETERMINED);
-            if step == settings.max_iterations || change.norm() < settings.epsilon * self.voxel {
+            let (change, length) = system.linearised.step(UNDETERMINED);
+            if step == settings.max_iterations || length < settings.epsilon * self.voxel {
                 return Some(system.result(transform, &inliers, source.len()));
             }
-            let [x, y, z, translation @ ..] = <[f64; 6]>::from(change);
-            let rotation_vector = [x, y, z].map(|angle| angle / system.unit);
-            transform = RigidTransform::about(system.center.into(), rotation_vector, translation) * transform;
+            transform = change * transform;
         }
         None
     }
 }
 
-/// The linearised distances of the inliers: how they change with a twist about their centre.
+/// The inliers' distances, linearised.
 struct System {
     points: Vec<[f64; 3]>,
-    center: Vector3<f64>,
-    /// Rotations in units of this length move points as far as translations do.
-    unit: f64,
-    design: Vec<[f64; 6]>,
-    information: Matrix6<f64>,
-    gradient: Vector6<f64>,
+    linearised: LinearisedDistances,
 }
 
 impl System {
     fn new(inliers: &[Residual], moved: &[[f64; 3]]) -> Self {
         let points: Vec<[f64; 3]> = inliers.iter().map(|one| moved[one.number]).collect();
-        let count = points.len() as f64;
-        let center = points.iter().map(|point| Vector3::from(*point)).sum::<Vector3<f64>>() / count;
-        let offset = |point: &[f64; 3]| Vector3::from(*point) - center;
-        let square = points.iter().map(|point| offset(point).norm_squared()).sum::<f64>() / count;
-        let unit = if square > 0.0 { square.sqrt() } else { 1.0 };
-        let row = |(one, point): (&Residual, &[f64; 3])| -> [f64; 6] {
-            let rotational = (offset(point) / unit).cross(&one.normal);
-            [rotational.x, rotational.y, rotational.z, one.normal.x, one.normal.y, one.normal.z]
-        };
-        let design: Vec<[f64; 6]> = inliers.iter().zip(&points).map(row).collect();
-        let (mut information, mut gradient) = (Matrix6::zeros(), Vector6::zeros());
-        for (row, one) in design.iter().zip(inliers) {
-            let row = Vector6::from(*row);
-            information += row * row.transpose();
-            gradient += row * one.distance;
-        }
-        Self { points, center, unit, design, information, gradient }
+        let rows: Vec<_> = points
+            .iter()
+            .zip(inliers)
+            .map(|(p, one)| (Vector3::from(*p), one.normal, one.distance))
+            .collect();
+        Self { points, linearised: LinearisedDistances::new(&rows) }
     }
 
     fn result(self, transform: RigidTransform, inliers: &[Residual], of: usize) -> PointToSurface {
@@ -275,12 +257,14 @@ impl System {
         let independent = self.independent_covariance(inliers);
         let covariance = independent * self.alike(&distances, &independent);
         let unit =
-            Matrix6::from_diagonal(&Vector6::from_fn(|k, _| if k < 3 { 1.0 / self.unit } else { 1.0 }));
+            Matrix6::from_diagonal(&Vector6::from_fn(
+                |k, _| if k < 3 { 1.0 / self.linearised.unit } else { 1.0 },
+            ));
         let square = distances.iter().map(|distance| distance * distance).sum::<f64>();
         PointToSurface {
             T_target_source: transform,
             covariance: unit * covariance * unit,
-            center: self.center.into(),
+            center: self.linearised.center.into(),
             normals: inliers.iter().map(|one| one.normal.into()).collect(),
             overlap: inliers.len() as f64 / of as f64,
             rms: (square / inliers.len() as f64).sqrt(),
@@ -300,24 +284,28 @@ impl System {
         // Of each target point with a part: for each axis of its error, how the gradient changes with it.
         let last = inliers.iter().flat_map(|one| one.neighbors).max().unwrap_or(0) as usize;
         let mut parts = vec![SMatrix::<f64, 6, 3>::zeros(); last + 1];
-        for (one, row) in inliers.iter().zip(&self.design) {
+        for (one, row) in inliers.iter().zip(&self.linearised.design) {
             let part = Vector6::from(*row) * one.normal.transpose();
             for (&neighbor, &weight) in one.neighbors.iter().zip(&one.weights) {
                 parts[neighbor as usize] += part * weight;
             }
         }
         let together = parts.iter().map(|part| part * part.transpose()).sum::<Matrix6<f64>>();
-        let inverse = pseudo_inverse(self.information, ROUNDING);
-        inverse * (self.information * of_source + together * of_target) * inverse
+        let inverse = pseudo_inverse(self.linearised.information, ROUNDING);
+        inverse * (self.linearised.information * of_source + together * of_target) * inverse
     }
 
     /// How much more the sums over blocks of neighbours vary than those of independent errors, 1 at least.
     fn alike(&self, distances: &[f64], independent: &Matrix6<f64>) -> f64 {
         let Some(block) = blocks(&self.points) else { return 1.0 };
-        let clustered = clustered_covariance(&self.design, distances, &block);
-        let expected = (independent * self.information).trace();
+        let clustered = clustered_covariance(&self.linearised.design, distances, &block);
+        let expected = (independent * self.linearised.information).trace();
         // Without any noise nothing varies.
-        if expected > 0.0 { ((clustered * self.information).trace() / expected).max(1.0) } else { 1.0 }
+        if expected > 0.0 {
+            ((clustered * self.linearised.information).trace() / expected).max(1.0)
+        } else {
+            1.0
+        }
     }
 }
 
