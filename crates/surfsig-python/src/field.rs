@@ -7,9 +7,12 @@ use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use surfsig::{
-    FIELD_PHASES, FIELD_SIGNATURE, FieldOptions, FieldPatches, FieldPlaces, KeypointOptions, Monitor,
-    PointCloud, Queries, Radius,
+    FIELD_PHASES, FIELD_SIGNATURE, FieldOptions, FieldPatches, FieldPhases, FieldPlaces, KeypointOptions,
+    Monitor, PointCloud, Queries, Radius,
 };
+
+/// Numbers that the phases of a place are.
+pub const PHASES: usize = size_of::<FieldPhases>() / size_of::<f32>();
 
 /// Make field signatures; see `surfsig.extract_field_signatures`. With `pools` what the frame sees in place of them.
 #[pyfunction]
@@ -42,19 +45,19 @@ pub fn field_signatures<'py>(
         let work = |monitor: &Monitor| surfsig::field_pools(&cloud, radius, &queries, &options, monitor);
         let found = watched(py, Some(total), progress.as_ref(), work)?;
         let sums: Vec<f32> = found.values.iter().flat_map(|pool| pool.as_flattened()).copied().collect();
-        arrays.set_item("pools", table(py, sums, total)?)?;
+        arrays.set_item("pools", table(py, sums, numbers_each(&found.values))?)?;
         places(&arrays, found)?;
     } else {
         let work = |monitor: &Monitor| surfsig::field_signatures(&cloud, radius, &queries, &options, monitor);
         let found = watched(py, Some(total), progress.as_ref(), work)?;
         let mut vectors = Vec::with_capacity(total * FIELD_SIGNATURE);
-        let mut phases = Vec::with_capacity(total * 14 * FIELD_PHASES);
+        let mut phases = Vec::with_capacity(total * PHASES);
         for signature in &found.values {
             vectors.extend_from_slice(signature.vector.as_slice());
             phases.extend_from_slice(signature.phases.as_flattened().as_flattened());
         }
-        arrays.set_item("vectors", table(py, vectors, total)?)?;
-        arrays.set_item("phases", table(py, phases, total)?)?;
+        arrays.set_item("vectors", table(py, vectors, FIELD_SIGNATURE)?)?;
+        arrays.set_item("phases", table(py, phases, PHASES)?)?;
         places(&arrays, found)?;
     }
     Ok(arrays)
@@ -87,13 +90,12 @@ pub fn field_keypoints<'py>(
     let work = |monitor: &Monitor| surfsig::find_keypoints(&cloud, radius, &keypoints, &options, monitor);
     let found = watched(py, None, progress.as_ref(), work)?;
     let arrays = PyDict::new(py);
-    let total = found.len();
     arrays.set_item("indices", found.indices.into_pyarray(py))?;
-    arrays.set_item("vectors", table(py, found.vectors.into_flattened(), total)?)?;
+    arrays.set_item("vectors", table(py, found.vectors.into_flattened(), FIELD_SIGNATURE)?)?;
     let phases = found.phases.as_flattened().as_flattened().as_flattened().to_vec();
-    arrays.set_item("phases", table(py, phases, total)?)?;
-    arrays.set_item("axes", table(py, found.axes.into_flattened(), total)?)?;
-    arrays.set_item("tangents", table(py, found.tangents.into_flattened(), total)?)?;
+    arrays.set_item("phases", table(py, phases, PHASES)?)?;
+    arrays.set_item("axes", table(py, found.axes.into_flattened(), 3)?)?;
+    arrays.set_item("tangents", table(py, found.tangents.into_flattened(), 3)?)?;
     arrays.set_item("count", found.count.into_pyarray(py))?;
     Ok(arrays)
 }
@@ -110,7 +112,6 @@ pub struct PlacesArgument<'py>(
 
 impl PlacesArgument<'_> {
     pub fn places(&self) -> PyResult<FieldPlaces> {
-        const PHASES: usize = 14 * FIELD_PHASES;
         let phases = rows::<f32, PHASES>(&self.4)?.as_flattened().as_chunks::<2>().0;
         let orders = phases.as_chunks::<FIELD_PHASES>().0.as_chunks::<7>().0;
         let places = FieldPlaces {
@@ -156,18 +157,21 @@ pub fn match_fields<'py>(
     Ok(arrays)
 }
 
-/// As many rows as there are places.
-pub fn table(py: Python<'_>, values: Vec<f32>, count: usize) -> PyResult<Bound<'_, PyAny>> {
-    let width = values.len() / count.max(1);
+/// Rows of `width` numbers; where there are no rows, they have that width, too.
+pub fn table(py: Python<'_>, values: Vec<f32>, width: usize) -> PyResult<Bound<'_, PyAny>> {
+    let count = values.len() / width;
     Ok(PyArray1::from_vec(py, values).reshape([count, width])?.into_any())
+}
+
+fn numbers_each<T>(_: &[Box<T>]) -> usize {
+    size_of::<T>() / size_of::<f32>()
 }
 
 /// What belongs to a patch whatever it holds.
 fn places<T>(arrays: &Bound<'_, PyDict>, found: FieldPatches<T>) -> PyResult<()> {
     let py = arrays.py();
-    let count = found.count.len();
-    arrays.set_item("axes", table(py, found.axes.into_flattened(), count)?)?;
-    arrays.set_item("tangents", table(py, found.tangents.into_flattened(), count)?)?;
+    arrays.set_item("axes", table(py, found.axes.into_flattened(), 3)?)?;
+    arrays.set_item("tangents", table(py, found.tangents.into_flattened(), 3)?)?;
     arrays.set_item("count", found.count.into_pyarray(py))?;
     let status: Vec<u8> = found.status.into_iter().map(|status| status as u8).collect();
     arrays.set_item("status", status.into_pyarray(py))

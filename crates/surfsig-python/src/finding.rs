@@ -1,6 +1,6 @@
 //! Instances of models, for Python.
 
-use crate::field::{PlacesArgument, table};
+use crate::field::{PHASES, PlacesArgument, table};
 use crate::registration::{ScanArgument, free_directions_to_python};
 use crate::rows;
 use crate::settings::settings_class;
@@ -8,7 +8,7 @@ use crate::watched::watched;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use surfsig::{FIND_STEPS_PER_MODEL, FieldPlaces, Instance, Model, Monitor};
+use surfsig::{FIELD_SIGNATURE, FIND_STEPS_PER_MODEL, FieldPlaces, Instance, Model, Monitor};
 
 settings_class! {
     /// How instances are searched and judged, for experts; see `surfsig.find_instances`.
@@ -116,13 +116,12 @@ pub fn prepare_model<'py>(
     result.set_item("normals", matrix(model.normals)?)?;
     result.set_item("is_sided", model.is_sided)?;
     let (places, arrays) = (model.places, PyDict::new(py));
-    let total = places.len();
     arrays.set_item("points", matrix(places.points)?)?;
-    arrays.set_item("vectors", table(py, places.vectors.into_flattened(), total)?)?;
-    arrays.set_item("axes", table(py, places.axes.into_flattened(), total)?)?;
-    arrays.set_item("tangents", table(py, places.tangents.into_flattened(), total)?)?;
+    arrays.set_item("vectors", table(py, places.vectors.into_flattened(), FIELD_SIGNATURE)?)?;
+    arrays.set_item("axes", table(py, places.axes.into_flattened(), 3)?)?;
+    arrays.set_item("tangents", table(py, places.tangents.into_flattened(), 3)?)?;
     let phases = places.phases.as_flattened().as_flattened().as_flattened().to_vec();
-    arrays.set_item("phases", table(py, phases, total)?)?;
+    arrays.set_item("phases", table(py, phases, PHASES)?)?;
     arrays.set_item("count", places.count.into_pyarray(py))?;
     result.set_item("places", arrays)?;
     Ok(result)

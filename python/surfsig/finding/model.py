@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,7 +43,8 @@ class Model:
     def argument(self) -> tuple[Any, ...]:
         """Give the model as the core takes it."""
         places = self.signatures
-        count = len(places)
+        # A flat model has no places, and a reshape to -1 columns needs a row.
+        phases = np.ascontiguousarray(places.phases, np.complex64).view(np.float32)
         return (
             np.ascontiguousarray(self.points, np.float64),
             np.asarray(self.center, np.float64).tolist(),
@@ -55,7 +57,7 @@ class Model:
                 np.ascontiguousarray(places.vectors, np.float32),
                 np.ascontiguousarray(places.axes, np.float32),
                 np.ascontiguousarray(places.tangents, np.float32),
-                np.ascontiguousarray(places.phases, np.complex64).view(np.float32).reshape(count, -1),
+                phases.reshape(len(places), math.prod(phases.shape[1:])),
             ),
             bool(self.is_sided),
         )
