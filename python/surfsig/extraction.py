@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
@@ -39,7 +39,7 @@ class Status(enum.IntEnum):
     DEGENERATE = 3
     """The points lie on a line or a conic and determine no paraboloid: no curvature."""
     NOT_CONVERGED = 4
-    """The surface's own axes did not settle; the values are those of the last turn (edges, corners)."""
+    """The surface's own axes did not converge; the values are those of the last iteration (edges, corners)."""
     OUTSIDE_VOCABULARY = 5
     """More curved than any atom of the frame: curvature, but no signature."""
     ONE_SIDED = 6
@@ -59,6 +59,14 @@ class FitUsed(enum.IntEnum):
     """The paraboloid's."""
     QUADRIC = 2
     """The implicit quadric's."""
+
+
+_NO_COLUMNS = {"radius", "axes", "oriented", "points", "indices", "coefficients"}
+"""Attributes of an extraction that are no columns of files and tables."""
+_PREFIXES = {"normals": "n", "directions": "direction_"}
+"""Before x, y and z in the names of vectors' columns."""
+_DERIVED_AFTER = {"k2": ("gaussian_curvature", "mean_curvature"), "k2_std": ("noise",)}
+"""Columns that are made of others, each after one of them."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,10 +97,6 @@ class Extraction:
     """Unit normals, (m, 3), towards the sensor."""
     directions: FloatArray
     """Unit tangents along k1, (m, 3); their sign means nothing."""
-    residual: FloatArray
-    """Root mean square of the points' heights above the fit, (m,)."""
-    condition: FloatArray
-    """At least this factor is on the standard error of the worst determined coefficient, (m,)."""
     mean_curvature_std: FloatArray
     """Standard error of the mean curvature, (m,), from the actual normal equations and the residual; NaN
     in the sensor's axes, and where no more than six points are in the ball."""
@@ -101,6 +105,10 @@ class Extraction:
     0.7 to 0.8 of it, by nature."""
     k2_std: FloatArray
     """Standard error of k2, (m,)."""
+    residual: FloatArray
+    """Root mean square of the points' heights above the fit, (m,)."""
+    condition: FloatArray
+    """At least this factor is on the standard error of the worst determined coefficient, (m,)."""
     count: NDArray[np.uint32]
     """Points in the ball, (m,), the place itself included where it is a point of the cloud."""
     status: NDArray[np.uint8]
@@ -161,26 +169,19 @@ class Extraction:
         direction_z, mean_curvature_std, k1_std, k2_std, noise, residual, condition, count, status, linearity,
         planarity, scattering; and radius where each place has its own, and fit_used where there is a choice.
         """
-        columns: dict[str, NDArray[Any]] = {"k1": self.k1, "k2": self.k2}
-        columns |= {"gaussian_curvature": self.gaussian_curvature, "mean_curvature": self.mean_curvature}
-        for letter, vectors in (("n", self.normals), ("direction_", self.directions)):
-            columns |= {letter + axis: vectors[:, i] for i, axis in enumerate("xyz")}
-        names = [
-            "mean_curvature_std",
-            "k1_std",
-            "k2_std",
-            "noise",
-            "residual",
-            "condition",
-            "count",
-            "status",
-        ]
-        names += ["linearity", "planarity", "scattering"]
-        if not isinstance(self.radius, float):
-            names.insert(0, "radius")
-        if self.fit_used is not None:
-            names.append("fit_used")
-        return columns | {name: getattr(self, name) for name in names}
+        columns: dict[str, NDArray[Any]] = {}
+        for column in fields(self):
+            name = column.name
+            values = getattr(self, name)
+            if name in _PREFIXES:
+                columns |= {_PREFIXES[name] + axis: values[:, i] for i, axis in enumerate("xyz")}
+            elif name not in _NO_COLUMNS and values is not None:
+                columns[name] = values
+            for derived in _DERIVED_AFTER.get(name, ()):
+                columns[derived] = getattr(self, derived)
+            if name == "directions" and not isinstance(self.radius, float):
+                columns["radius"] = self.radius
+        return columns
 
     def to_pandas(self) -> pd.DataFrame:
         """Give x, y, z and `columns` as a pandas DataFrame, whose index has the points' numbers (`indices`).

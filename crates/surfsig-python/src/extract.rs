@@ -7,8 +7,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use surfsig::{
-    ExtractOptions, Extraction, FitAxes, FitKind, Monitor, Neighborhood, Offsets, PointCloud, Queries,
-    Radius, Resolution,
+    Column, ExtractOptions, Extraction, FitAxes, FitKind, Monitor, Neighborhood, Offsets, PointCloud,
+    Queries, Radius, Resolution,
 };
 
 /// An (n, 3) array of either precision, contiguous.
@@ -135,37 +135,23 @@ pub fn extract<'py>(
     extractions.into_iter().map(|extraction| to_arrays(py, extraction)).collect()
 }
 
-/// Moves the columns into NumPy arrays, without a copy.
+/// Moves the columns into NumPy arrays, by the names of Python's `Extraction`.
 fn to_arrays(py: Python<'_>, extraction: Extraction) -> PyResult<Bound<'_, PyDict>> {
     fn matrix<const N: usize>(py: Python<'_>, rows: Vec<[f32; N]>) -> PyResult<Bound<'_, PyAny>> {
         let count = rows.len();
         Ok(PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])?.into_any())
     }
     let arrays = PyDict::new(py);
-    if !extraction.fit_used.is_empty() {
-        let used: Vec<u8> = extraction.fit_used.iter().map(|&used| used as u8).collect();
-        arrays.set_item("fit_used", used.into_pyarray(py))?;
-    }
-    if !extraction.radii.is_empty() {
-        arrays.set_item("radius", extraction.radii.into_pyarray(py))?;
-    }
-    arrays.set_item("k1", extraction.k1.into_pyarray(py))?;
-    arrays.set_item("k2", extraction.k2.into_pyarray(py))?;
-    arrays.set_item("normals", matrix(py, extraction.normals)?)?;
-    arrays.set_item("directions", matrix(py, extraction.directions)?)?;
-    arrays.set_item("residual", extraction.residual.into_pyarray(py))?;
-    arrays.set_item("condition", extraction.condition.into_pyarray(py))?;
-    arrays.set_item("mean_curvature_std", extraction.mean_curvature_std.into_pyarray(py))?;
-    arrays.set_item("k1_std", extraction.k1_std.into_pyarray(py))?;
-    arrays.set_item("k2_std", extraction.k2_std.into_pyarray(py))?;
-    arrays.set_item("count", extraction.count.into_pyarray(py))?;
-    let status: Vec<u8> = extraction.status.into_iter().map(|status| status as u8).collect();
-    arrays.set_item("status", status.into_pyarray(py))?;
-    arrays.set_item("linearity", extraction.linearity.into_pyarray(py))?;
-    arrays.set_item("planarity", extraction.planarity.into_pyarray(py))?;
-    arrays.set_item("scattering", extraction.scattering.into_pyarray(py))?;
-    if extraction.axes == FitAxes::Sensor {
-        arrays.set_item("coefficients", matrix(py, extraction.coefficients)?)?;
+    for (name, column) in extraction.into_columns() {
+        let array = match column {
+            Column::Scalars(numbers) => numbers.into_pyarray(py).into_any(),
+            Column::Vectors(rows) => matrix(py, rows)?,
+            Column::Coefficients(rows) => matrix(py, rows)?,
+            Column::Counts(counts) => counts.into_pyarray(py).into_any(),
+            Column::Statuses(all) => PyArray1::from_iter(py, all.iter().map(|&one| one as u8)).into_any(),
+            Column::FitsUsed(all) => PyArray1::from_iter(py, all.iter().map(|&one| one as u8)).into_any(),
+        };
+        arrays.set_item(if name == "radii" { "radius" } else { name }, array)?;
     }
     Ok(arrays)
 }

@@ -79,8 +79,8 @@ pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
 pub use depth_image::{DepthImage, Judgement, SurfacePlace};
 pub use error::Error;
 pub use extract::{
-    ExtractOptions, Extraction, Neighborhood, Queries, extract, extract_auto_radius, extract_monitored,
-    extract_radii, voxel_representatives,
+    Column, ExtractOptions, Extraction, Neighborhood, Queries, extract, extract_auto_radius,
+    extract_monitored, extract_radii, voxel_representatives,
 };
 pub use field::{
     FIELD_PHASES, FIELD_SIGNATURE, FieldMatch, FieldOptions, FieldPatches, FieldPhases, FieldPlaces,

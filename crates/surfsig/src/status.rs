@@ -18,7 +18,7 @@ pub enum Status {
     TooFewPoints = 2,
     /// The points lie on a line, or on a conic, and determine no paraboloid: no curvature.
     Degenerate = 3,
-    /// The axes did not settle: the values are those of the last turn. Typical of edges, corners and
+    /// The axes did not converge: the values are those of the last iteration. Typical of edges, corners and
     /// patches that are large against the radius of curvature.
     NotConverged = 4,
     /// The surface is more curved than any atom of the frame: curvature, but no signature.

@@ -2,6 +2,7 @@
 
 mod auto_radius;
 mod columns;
+mod declaration;
 mod explained;
 mod extraction;
 mod neighborhood;
@@ -13,7 +14,7 @@ mod shares;
 mod worker;
 
 pub use auto_radius::extract_auto_radius;
-pub use extraction::Extraction;
+pub use extraction::{Column, Extraction};
 pub use neighborhood::Neighborhood;
 pub use queries::{Queries, voxel_representatives};
 pub use radii::extract_radii;
@@ -24,7 +25,7 @@ use crate::hierarchy::DENSE;
 use crate::simd::InstructionSet;
 use crate::threads::with_threads;
 use crate::{Error, Monitor, PointCloud, Radius};
-use columns::{Columns, ColumnsPart};
+use extraction::{Columns, ColumnsPart, Conditions, Entries};
 use neighborhood::first_radius;
 use rayon::prelude::*;
 use shares::{Share, shares};
@@ -235,10 +236,11 @@ fn run(
     }
     let lengths: Vec<usize> = shares.iter().map(Share::len).collect();
     let entries = lengths.iter().sum();
+    let conditions = Conditions::new(own_radii, options);
     let mut columns: Vec<Columns> = balls
         .radii
         .iter()
-        .map(|radius| Columns::new(entries, radius * balls.largest.get(), own_radii, options))
+        .map(|radius| Columns::new(entries, radius * balls.largest.get(), conditions))
         .collect();
     let mut parts: Vec<Vec<ColumnsPart<'_>>> = lengths.iter().map(|_| Vec::new()).collect();
     for columns in &mut columns {
@@ -260,10 +262,9 @@ fn run(
         },
     )?;
     let oriented = options.viewpoint.is_some() || options.directions.is_some();
-    let finish = |columns: Columns| {
-        let query_of_entry = shares.iter().flat_map(Share::ranks).map(|rank| asked.point_of_rank[rank]);
-        columns.finish(queries.len(cloud), query_of_entry, options.axes, oriented)
-    };
+    let query_of_entry = shares.iter().flat_map(Share::ranks).map(|rank| asked.point_of_rank[rank]);
+    let entries = Entries::new(queries.len(cloud), query_of_entry);
+    let finish = |columns: Columns| columns.ordered(&entries, options.axes, oriented);
     let of_balls = columns.into_iter().map(finish).collect();
     left.extend(
         short.into_inner().expect("no thread panics with the lock").into_iter().map(|query| query as usize),

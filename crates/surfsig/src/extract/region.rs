@@ -1,6 +1,6 @@
 //! A thread's work where points are dense: whole regions, through the hierarchy.
 
-use super::columns::ColumnsPart;
+use super::extraction::ColumnsPart;
 use super::shares::DenseCell;
 use super::worker::{Pending, Worker};
 use crate::cell_index::CellIndex;

@@ -1,6 +1,7 @@
 //! One thread's share of the loop over points.
 
-use super::columns::{ColumnsPart, Fit};
+use super::columns::Fit;
+use super::extraction::ColumnsPart;
 use super::robust::{self, Distances, without_outliers};
 use super::{ExtractOptions, Neighborhood};
 use crate::ball::DirectWalk;

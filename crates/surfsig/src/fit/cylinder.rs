@@ -21,10 +21,10 @@ const FOLLOWED: usize = 4;
 /// Steps along one start, most of which need fewer than 8.
 const MAX_STEPS: usize = 40;
 
-/// Half the angle between the axes from which the derivatives are taken.
-const TURN: f64 = 1e-4;
+/// Radians between the axes of whose mean squares the derivatives are differences.
+const ANGLE_STEP: f64 = 1e-4;
 
-/// A turn of the axis that counts as none.
+/// Radians by which the axis still rotates once it has converged.
 const CONVERGED: f64 = 1e-10;
 
 /// A cylinder that was fitted.
@@ -112,9 +112,9 @@ fn descend(pencil: &Pencil, start: Vector3<f64>) -> Option<(Vector3<f64>, Best)>
     let mut damping = 0.0;
     for _ in 0..MAX_STEPS {
         let [u, v] = axes_across(&axis);
-        let turned = |s: f64, t: f64| (axis + s * u + t * v).normalize();
+        let tilted = |s: f64, t: f64| (axis + s * u + t * v).normalize();
         let at = |i: i32, j: i32| {
-            Some(along(pencil, &turned(f64::from(i) * TURN, f64::from(j) * TURN))?.mean_square)
+            Some(along(pencil, &tilted(f64::from(i) * ANGLE_STEP, f64::from(j) * ANGLE_STEP))?.mean_square)
         };
         let centre = best.mean_square;
         let (left, right, down, up) = (at(-1, 0)?, at(1, 0)?, at(0, -1)?, at(0, 1)?);
@@ -125,9 +125,9 @@ fn descend(pencil: &Pencil, start: Vector3<f64>) -> Option<(Vector3<f64>, Best)>
         let eigen = bend.symmetric_eigen();
         let (least, most) = (eigen.eigenvalues.min(), eigen.eigenvalues.amax());
         let lift = damping * most + (1e-3 * most - least).max(0.0);
-        let step = -(bend + Matrix2::identity() * lift).try_inverse()? * slope * TURN;
+        let step = -(bend + Matrix2::identity() * lift).try_inverse()? * slope * ANGLE_STEP;
         let step = step * (0.3 / step.norm().max(0.3));
-        let next = turned(step.x, step.y);
+        let next = tilted(step.x, step.y);
         match along(pencil, &next) {
             Some(found) if found.mean_square <= centre => {
                 (axis, best, damping) = (next, found, 0.1 * damping);

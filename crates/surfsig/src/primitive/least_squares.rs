@@ -3,25 +3,26 @@
 use super::geometry::{MOST_PARAMETERS, Primitive, Vector};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// How long a fit is followed.
+/// When the iterations of a fit end.
 #[derive(Clone, Copy)]
-pub(crate) struct Patience {
-    /// Steps after which it is taken as it is.
-    steps: usize,
-    /// It has settled where a step gains less than this share of the sum of squares.
-    settled: f64,
-    /// A radius so many times the points' extent is that of a plane.
+pub(crate) struct Termination {
+    /// Iterations, at most.
+    max_iterations: usize,
+    /// It has converged where a step gains less than this share of the sum of squares.
+    relative_gain: f64,
+    /// Radius, in the points' extents, from which on the surface is a plane.
     flat: f64,
 }
 
 /// Among noise: what is left to gain is less than noise.
-pub(crate) const QUICK: Patience = Patience { steps: 30, settled: 1e-4, flat: 100.0 };
+pub(crate) const QUICK: Termination = Termination { max_iterations: 30, relative_gain: 1e-4, flat: 100.0 };
 
 /// Without noise, along the narrow valleys of small patches: to the exact surface.
-pub(crate) const EXACT: Patience = Patience { steps: 200, settled: 1e-7, flat: 100.0 };
+pub(crate) const EXACT: Termination = Termination { max_iterations: 200, relative_gain: 1e-7, flat: 100.0 };
 
 /// To the last digits, for points that somebody chose.
-pub(super) const EXHAUSTIVE: Patience = Patience { steps: 500, settled: 1e-13, flat: 1e6 };
+pub(super) const EXHAUSTIVE: Termination =
+    Termination { max_iterations: 500, relative_gain: 1e-13, flat: 1e6 };
 
 /// Distances that are nothing, in units of the points' extent.
 const NOTHING: f64 = 1e-12;
@@ -35,16 +36,21 @@ pub(crate) struct Fitted {
 
 /// The nearest surface of the same kind for which the sum of squared distances is least; `None` where there is none,
 /// or the points are fewer than its parameters.
-pub(crate) fn refine(start: Primitive, points: &[Vector], extent: f64, patience: Patience) -> Option<Fitted> {
+pub(crate) fn refine(
+    start: Primitive,
+    points: &[Vector],
+    extent: f64,
+    termination: Termination,
+) -> Option<Fitted> {
     let parameters = start.kind.parameters();
-    if points.len() <= parameters || !start.is_valid(extent, patience.flat) {
+    if points.len() <= parameters || !start.is_valid(extent, termination.flat) {
         return None;
     }
     let mut damping = 1e-4;
     let mut primitive = start;
     let (mut normal, mut gradient, mut sum) = equations(&primitive, points);
     let nothing = (NOTHING * extent).powi(2) * points.len() as f64;
-    for _ in 0..patience.steps {
+    for _ in 0..termination.max_iterations {
         if sum <= nothing {
             break;
         }
@@ -66,9 +72,9 @@ pub(crate) fn refine(start: Primitive, points: &[Vector], extent: f64, patience:
             let gain = sum - new_sum;
             (primitive, normal, gradient) = (moved, new_normal, new_gradient);
             damping *= 0.1;
-            let settled = gain <= patience.settled * sum;
+            let converged = gain <= termination.relative_gain * sum;
             sum = new_sum;
-            if settled {
+            if converged {
                 break;
             }
         } else {
@@ -79,7 +85,7 @@ pub(crate) fn refine(start: Primitive, points: &[Vector], extent: f64, patience:
             }
         }
     }
-    let valid = primitive.is_valid(extent, patience.flat) && sum.is_finite();
+    let valid = primitive.is_valid(extent, termination.flat) && sum.is_finite();
     valid.then(|| Fitted { primitive, rms: (sum / points.len() as f64).sqrt() })
 }
 

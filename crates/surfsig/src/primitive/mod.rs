@@ -14,7 +14,7 @@ pub(crate) use blocks::design_effect;
 pub use geometry::Primitive;
 pub(crate) use geometry::{Chart, Vector, extent};
 pub use kind::SurfaceKind;
-pub(crate) use least_squares::{EXACT, Patience, QUICK, refine};
+pub(crate) use least_squares::{EXACT, QUICK, Termination, refine};
 pub(crate) use start::{bent, start};
 pub use uncertainty::PrimitiveUncertainty;
 pub(crate) use uncertainty::uncertainty;

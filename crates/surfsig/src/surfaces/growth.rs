@@ -1,7 +1,9 @@
 //! A surface that grows over its neighbours.
 
 use super::scene::{Scene, Stamps};
-use crate::primitive::{EXACT, Patience, Primitive, QUICK, SurfaceKind, Vector, bent, extent, refine, start};
+use crate::primitive::{
+    EXACT, Primitive, QUICK, SurfaceKind, Termination, Vector, bent, extent, refine, start,
+};
 use nalgebra::Matrix3;
 
 /// Points that every surface has.
@@ -33,7 +35,7 @@ const SMALL: usize = 4;
 const LARGE: usize = 2000;
 
 /// Extent of a curved surface in units of its radius.
-const LEAST_TURN: f64 = 0.15;
+const MIN_ARC: f64 = 0.15;
 
 /// Standard deviation of a surface's points in units of its extent.
 const THICKEST: f64 = 0.035;
@@ -69,7 +71,7 @@ const ALONG: f64 = 0.9;
 const EVIDENCE: f64 = 10.0;
 
 impl Scene {
-    fn patience(&self, noise: f64) -> Patience {
+    fn termination(&self, noise: f64) -> Termination {
         if self.is_noiseless(noise) { EXACT } else { QUICK }
     }
 }
@@ -141,7 +143,7 @@ impl Grower<'_> {
         let mut fits: Vec<(Primitive, f64)> = Vec::new();
         for &kind in self.kinds {
             let simpler = fits.iter().map(|(primitive, _)| *primitive).collect::<Vec<_>>();
-            if let Some(fit) = fitted(kind, &points, &normals, &simpler, self.scene.patience(noise)) {
+            if let Some(fit) = fitted(kind, &points, &normals, &simpler, self.scene.termination(noise)) {
                 fits.push(fit);
                 if fit.1 <= ENOUGH * noise {
                     break;
@@ -158,8 +160,8 @@ impl Grower<'_> {
     fn more_complex(&self, kind: SurfaceKind, simpler: &Region, points: &[u32]) -> Option<Primitive> {
         let all = points.len() as f64;
         let (points, normals) = self.scene.sample(points, SAMPLE_OF_KIND);
-        let patience = self.scene.patience(simpler.noise);
-        let (primitive, deviation) = fitted(kind, &points, &normals, &[simpler.primitive], patience)?;
+        let termination = self.scene.termination(simpler.noise);
+        let (primitive, deviation) = fitted(kind, &points, &normals, &[simpler.primitive], termination)?;
         let chart = simpler.primitive.chart();
         let squares: f64 = points.iter().map(|point| chart.distance(point).powi(2)).sum();
         let before = (squares / points.len() as f64).sqrt();
@@ -210,7 +212,7 @@ fn fitted(
     points: &[Vector],
     normals: &[Vector],
     simpler: &[Primitive],
-    patience: Patience,
+    termination: Termination,
 ) -> Option<(Primitive, f64)> {
     let (count, parameters) = (points.len(), kind.parameters());
     if count < parameters + 5 {
@@ -219,7 +221,7 @@ fn fitted(
     let extent = extent(points);
     let starts =
         start(kind, points, normals).into_iter().chain(simpler.iter().flat_map(|p| bent(p, kind, extent)));
-    let fits = starts.filter_map(|start| refine(start, points, extent, patience));
+    let fits = starts.filter_map(|start| refine(start, points, extent, termination));
     let best = fits.min_by(|a, b| a.rms.total_cmp(&b.rms))?;
     Some((best.primitive, best.rms * (count as f64 / (count - parameters) as f64).sqrt()))
 }
@@ -241,7 +243,7 @@ impl Region {
         let step = self.members.len().div_ceil(most).max(1);
         let points: Vec<Vector> =
             self.members.iter().step_by(step).map(|&point| scene.points[point as usize]).collect();
-        let fitted = refine(self.primitive, &points, extent(&points), scene.patience(self.noise))?;
+        let fitted = refine(self.primitive, &points, extent(&points), scene.termination(self.noise))?;
         let (count, parameters) = (points.len() as f64, fitted.primitive.kind.parameters() as f64);
         self.primitive = fitted.primitive;
         self.deviation = fitted.rms * (count / (count - parameters)).sqrt();
@@ -266,7 +268,7 @@ impl Region {
     pub fn is_plausible(&self, scene: &Scene) -> bool {
         let (points, _) = scene.sample(&self.members, SAMPLE_OF_KIND);
         let extent = extent(&points);
-        let bent = self.primitive.kind == SurfaceKind::Plane || extent >= LEAST_TURN * self.primitive.radius;
+        let bent = self.primitive.kind == SurfaceKind::Plane || extent >= MIN_ARC * self.primitive.radius;
         bent && self.deviation <= THICKEST * extent
     }
 
