@@ -3,7 +3,8 @@
 use crate::Error;
 use crate::visibility::RangeImageSettings;
 
-/// How [`crate::Odometry`] works. Nothing has to be set.
+/// How [`crate::Odometry`] works. Nothing has to be set. `benchmarks/sweep_settings.py` shows what other values give on
+/// simulated scenes.
 ///
 /// Lengths of the first three fields are in the scans' unit; all others are in voxels, so that no number depends on the
 /// unit or the sensor. Where no other reason is given, a value is the one with which the simulated sequences of
