@@ -62,6 +62,11 @@ impl Drop for Cloud {
     }
 }
 
+/// A progress function that stops at once.
+unsafe extern "C" fn stop(_data: *mut c_void, _done: usize, _total: usize) -> c_int {
+    1
+}
+
 /// What C gives to a function that frees.
 fn owned<T>(object: *mut T) -> Option<Box<T>> {
     (!object.is_null()).then(|| unsafe { Box::from_raw(object) })
@@ -102,6 +107,7 @@ macro_rules! null_of_null {
 
 // After the macros, which they use.
 mod arguments;
+mod finding;
 mod fits;
 mod poses;
 mod results;
@@ -120,6 +126,9 @@ fn no_function_of_the_header_fails_but_by_a_code() {
     poses::registration_options(&mut called);
     poses::registrations(&mut called);
     poses::odometries(&mut called);
+    finding::options(&mut called);
+    finding::models(&mut called);
+    finding::instances(&mut called);
 
     let header = Path::new(env!("CARGO_MANIFEST_DIR")).join("include/surfsig.h");
     let text = std::fs::read_to_string(header).unwrap();

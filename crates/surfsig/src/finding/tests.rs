@@ -67,8 +67,8 @@ fn found_in(
     assert!(model.is_sided && model.is_closed());
     let scan = Scan::new(PointCloud::new_f64(points)).seen_from(viewpoint);
     let settings = FindSettings { threads, ..Default::default() };
-    let found = find_instances(&[&model], &scan, Some(viewpoint), &settings, &monitor)?;
-    assert_eq!(monitor.done(), 2 + FIND_STEPS_PER_MODEL);
+    let found = find_instances(&[&model], &scan, &settings, &monitor)?;
+    assert_eq!(monitor.done(), MODEL_STEPS + 2 + FIND_STEPS_PER_MODEL);
     Ok(found)
 }
 
@@ -199,7 +199,7 @@ fn free_space_speaks_against_what_is_not_there() {
     let scan = CenteredScan::new(&Scan::new(PointCloud::new_f64(&points)).seen_from(viewpoint));
     let model = model_of(body(1500));
     let monitor = Monitor::default();
-    let mut prepared = Scene::new(scan, Some(viewpoint), 1.0, &settings, &monitor).unwrap();
+    let mut prepared = Scene::new(scan, 1.0, &settings, &monitor).unwrap();
     let surface = prepared.fine_surface(0.15).unwrap();
     let center = RigidTransform::from_rotation_vector([0.0; 3], prepared.scan.center);
     let about = |pose: RigidTransform| center.inverse() * pose;
@@ -226,14 +226,14 @@ fn mistakes_are_told() {
     let whole = model_of(body(300));
     let mut damaged = whole.clone();
     damaged.normals.pop();
-    assert!(find_instances(&[&whole], &none, None, &settings, &monitor).unwrap().is_empty());
-    let error = find_instances(&[&damaged], &none, None, &settings, &monitor).unwrap_err();
+    assert!(find_instances(&[&whole], &none, &settings, &monitor).unwrap().is_empty());
+    let error = find_instances(&[&damaged], &none, &settings, &monitor).unwrap_err();
     assert!(matches!(error, Error::InvalidModel(_)));
     let stopped = Monitor::default();
     stopped.cancel();
     let points: Vec<[f64; 3]> = body(3000).into_iter().map(|(point, _)| point).collect();
     let scene = Scan::new(PointCloud::new_f64(&points));
-    let error = find_instances(&[&whole], &scene, None, &settings, &stopped).unwrap_err();
+    let error = find_instances(&[&whole], &scene, &settings, &stopped).unwrap_err();
     assert_eq!(error, Error::Cancelled);
     let sphere = [[1.0_f32, 0.0, 0.0], [-1.0, 0.0, 0.0]];
     assert_eq!((mean_length(sphere.iter()), mean_length([].iter())), (0.0, 0.0));
