@@ -39,16 +39,16 @@ fn sphere() -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// A cloud of the test's own points, freed at its end.
-struct Cloud(*mut surfsig_cloud);
+/// A cloud, freed at its end, with the points that it refers to.
+struct Cloud(*mut surfsig_cloud, #[expect(dead_code, reason = "the cloud refers to them")] Vec<[f64; 3]>);
 
 impl Cloud {
     fn of(points: &[[f64; 3]]) -> Self {
-        let mut made = null_mut();
+        let (mut made, points) = (null_mut(), points.to_vec());
         let code =
             unsafe { surfsig_cloud_new_f64(points.as_ptr().cast(), points.len(), 24, null(), &mut made) };
         assert_eq!(code, OK);
-        Self(made)
+        Self(made, points)
     }
 
     fn get(&self) -> Option<&surfsig_cloud> {

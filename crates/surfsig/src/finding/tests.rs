@@ -212,6 +212,41 @@ fn free_space_speaks_against_what_is_not_there() {
 }
 
 #[test]
+fn a_viewpoint_counts_where_all_can_have_been_seen_from_it() {
+    let (settings, monitor) = (FindSettings::default(), Monitor::default());
+    let viewpoint = [0.5, -3.0, 14.0];
+    let points: Vec<[f64; 3]> =
+        scene(viewpoint).0.iter().map(|point| [0, 1, 2].map(|k| point[k] - viewpoint[k])).collect();
+    let scan = Scan::new(PointCloud::new_f64(&points));
+    let prepared = |scan: &Scan<'_>| Scene::new(CenteredScan::new(scan), 1.0, &settings, &monitor).unwrap();
+    let (given, assumed) = (prepared(&scan.seen_from([0.0; 3])), prepared(&scan));
+    assert!(given.is_oriented && given.viewpoint == Some(given.scan.center.map(|x| -x)));
+    assert_eq!(assumed.viewpoint, given.viewpoint, "most sensors are at the origin of their own coordinates");
+    // The floor hides all else from below.
+    let below = [0.0, 0.0, -30.0];
+    let wrong = prepared(&scan.seen_from(below));
+    assert!(!wrong.is_oriented && wrong.viewpoint.is_none());
+    let upwards = vec![[0.0, 0.0, 1.0]; points.len()];
+    let both = prepared(&scan.seen_from([0.0; 3]).facing(&upwards));
+    assert!(both.is_oriented && both.viewpoint == given.viewpoint && both.scan.viewpoint.is_none());
+
+    let whole: Vec<[f64; 3]> = body(3000).into_iter().map(|(point, _)| point).collect();
+    let one_view: Vec<[f64; 3]> = whole.iter().copied().filter(|point| point[0] > 0.5).collect();
+    let sides = [
+        (&whole, None),
+        (&whole, Some([9.0, 0.0, 0.0])),
+        (&one_view, None),
+        (&one_view, Some([9.0, 0.0, 0.0])),
+    ]
+    .map(|(points, viewpoint)| {
+        let scan = Scan { viewpoint, ..Scan::new(PointCloud::new_f64(points)) };
+        Model::new(&scan, None, &monitor).unwrap().is_sided
+    });
+    // One view has an outer side by its viewpoint only, a whole body by its volume.
+    assert_eq!(sides, [true, true, false, true]);
+}
+
+#[test]
 fn mistakes_are_told() {
     let monitor = Monitor::default();
     let none = Scan::new(PointCloud::new(&[]));
