@@ -117,6 +117,24 @@ class Registration(Structure):
     )
 
 
+class Instance(Structure):
+    """A surfsig_instance."""
+
+    _fields_ = (
+        ("model", c_size_t),
+        ("T_scene_model", Transform),
+        ("covariance", c_double * 36),
+        ("center", c_double * 3),
+        ("score", c_double),
+        ("visible", c_double),
+        ("overlap", c_double),
+        ("rms", c_double),
+        ("free_direction_count", c_size_t),
+        ("free_directions", FreeDirection * 6),
+        ("point_count", c_size_t),
+    )
+
+
 class ScanPose(Structure):
     """A surfsig_scan_pose."""
 
@@ -159,22 +177,26 @@ class CInterface:
         self.functions = f = ctypes.CDLL(str(self.library))
         for name in ("version", "last_error", "status_name", "surface_kind_name", "scan_status_name"):
             getattr(f, f"surfsig_{name}").restype = c_char_p
-        for name in ("options_new", "surface_options_new", "registration_options_new"):
-            getattr(f, f"surfsig_{name}").restype = c_void_p
-        sizes = ("cloud_size", "extraction_size", "surfaces_size", "surfaces_label_count", "odometry_size")
-        for name in (*sizes, "surface_kind_parameters"):
+        for name in ("options", "surface_options", "registration_options", "find_options"):
+            getattr(f, f"surfsig_{name}_new").restype = c_void_p
+        sized = ("cloud", "extraction", "surfaces", "odometry", "model", "instances")
+        sizes = tuple(f"{name}_size" for name in sized)
+        for name in (*sizes, "surfaces_label_count", "surface_kind_parameters"):
             getattr(f, f"surfsig_{name}").restype = c_size_t
         numbers = ("radius", "major_radius", "half_angle", "independent_error")
         for name in (
             "similarity",
             "extraction_radius",
             "odometry_voxel",
+            "model_radius",
+            "model_spacing",
             *(f"primitive_{number}" for number in numbers),
         ):
             getattr(f, f"surfsig_{name}").restype = c_double
         for name in ("primitive_point", "primitive_axis", "surfaces_covariance"):
             getattr(f, f"surfsig_{name}").restype = POINTER(c_double)
         f.surfsig_surfaces_labels.restype = POINTER(c_int32)
+        f.surfsig_instances_indices.restype = POINTER(c_uint32)
         f.surfsig_transform_identity.restype = Transform
         text = self.header.read_text()
         self.columns_of = {kind: _columns(text, kind) for kind in ("extraction", "surfaces")}

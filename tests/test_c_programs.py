@@ -194,6 +194,11 @@ def test_the_examples(installed: Path, tmp_path: Path, target: str) -> None:
     assert len(scans) == 12
     assert all(": tracked, " in scan for scan in scans)
 
+    # That both lie within a millimetre and a degree of where they are is the program's own condition.
+    model, *instances = run(build / "finding").splitlines()
+    assert model.startswith("a model of 8000 points, ")
+    assert len(instances) == 2
+
 
 def test_the_makefile_installs_where_it_is_told(tmp_path: Path, installed: Path) -> None:
     run("make", "-C", ROOT, "install-c", f"PREFIX={tmp_path}")

@@ -34,8 +34,10 @@ __all__ = [
     "find_surfaces",
     "fit_primitive",
     "free_directions",
+    "hidden_from",
     "match_fields",
     "mean_neighbor_distances",
+    "measured_from_origin",
     "point_spacing",
     "prepare_model",
     "register",
@@ -314,12 +316,19 @@ def find_instances(
     scene: _Scan,
     *,
     min_score: float,
-    free_space_viewpoint: list[float] | None = None,
     settings: FindSettings | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> list[dict[str, Any]]: ...
 def point_spacing(points: NDArray[np.float64]) -> float: ...
+def hidden_from(
+    direction: list[float],
+    across: list[list[float]],
+    places: NDArray[np.float64],
+    points: NDArray[np.float64],
+    spacing: float,
+) -> NDArray[np.bool_]: ...
+def measured_from_origin(points: NDArray[np.float64], spacing: float) -> bool: ...
 def free_directions(
     points: NDArray[np.float64], normals: NDArray[np.float64]
 ) -> list[tuple[Literal["rotation", "translation"], list[float] | None, list[float] | None]]: ...

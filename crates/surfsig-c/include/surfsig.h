@@ -266,6 +266,23 @@ typedef struct surfsig_cloud surfsig_cloud;
 typedef struct surfsig_extraction surfsig_extraction;
 
 /**
+ * How models are prepared and looked for. Made by surfsig_find_options_new(), freed by surfsig_find_options_free().
+ */
+typedef struct surfsig_find_options surfsig_find_options;
+
+/**
+ * All instances in a scene, the best first. Made by surfsig_find_instances(), freed by surfsig_instances_free(). It
+ * refers to nothing of the caller's.
+ */
+typedef struct surfsig_instances surfsig_instances;
+
+/**
+ * What is looked for, prepared once. Made by surfsig_model_new(), freed by surfsig_model_free(). It refers to nothing
+ * of the caller's, and may be looked for by several threads at once.
+ */
+typedef struct surfsig_model surfsig_model;
+
+/**
  * A sensor that is followed from scan to scan. Made by surfsig_odometry_new(), freed by surfsig_odometry_free(). It
  * refers to nothing of the caller's.
  */
@@ -298,6 +315,116 @@ typedef struct surfsig_surface_options surfsig_surface_options;
  * the caller's.
  */
 typedef struct surfsig_surfaces surfsig_surfaces;
+
+/**
+ * Told how far work is, some twenty times a second, by the thread that called surfsig; the work itself is done by
+ * others meanwhile. Must return, neither by an exception nor by longjmp().
+ *
+ * @param data What was given with the function.
+ * @param done How much is done.
+ * @param total Of how much; the same for all calls.
+ * @return 0 to go on; anything else stops the work, whose function then returns SURFSIG_CODE_CANCELLED.
+ */
+typedef int (*surfsig_progress)(void *data, size_t done, size_t total);
+
+/**
+ * A scan: its points, and what is known of where they were seen from.
+ */
+typedef struct {
+  /**
+   * The points.
+   */
+  const surfsig_cloud *cloud;
+  /**
+   * Where the sensor stood, in the cloud's coordinates: 3 doubles, finite; null where nobody knows.
+   */
+  const double *viewpoint;
+  /**
+   * In place of a viewpoint: for each point a vector of any length to the side from which it was seen, such as its
+   * normal, (count, 3) floats, packed; null for none. Models and scenes in which they are looked for may have both.
+   */
+  const float *directions;
+} surfsig_scan;
+
+/**
+ * A rotation and a translation: a point p of the source is at R p + t of the target. Written T_target_source, so that
+ * T_a_b T_b_c = T_a_c.
+ *
+ * The matrix is that of Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(transform.matrix), and its
+ * transpose that of a column-major matrix. A twist is a rotation vector in radians, and then a translation.
+ */
+typedef struct {
+  /**
+   * R and t, and 0, 0, 0, 1: 4 x 4, row by row.
+   */
+  double matrix[16];
+} surfsig_transform;
+
+/**
+ * A motion that does not change a surface, so that a transform of it is not determined in that direction.
+ */
+typedef struct {
+  /**
+   * Unit vector along a translation or a rotation's axis; NaN for rotations about every axis through the point.
+   */
+  double axis[3];
+  /**
+   * A point on the rotation's axis; NaN for a translation.
+   */
+  double point[3];
+} surfsig_free_direction;
+
+/**
+ * A model that is in a scene.
+ */
+typedef struct {
+  /**
+   * The model's number among those that were looked for, from 0.
+   */
+  size_t model;
+  /**
+   * Takes the model's points to the scene.
+   */
+  surfsig_transform T_scene_model;
+  /**
+   * Of the small twist (rotation vector in radians, then translation) in the scene's axes, about the center, that
+   * takes the given transform to the true one: 6 x 6, row by row.
+   */
+  double covariance[36];
+  /**
+   * Middle of what lies on the scene's points, in the scene's coordinates.
+   */
+  double center[3];
+  /**
+   * What of the model is confirmed, less what is wrong, over the most of it that can be seen at once; 0.6 of that
+   * where it is not known from where the scene was seen.
+   */
+  double score;
+  /**
+   * Share of the surface facing the sensor that is seen, 0 to 1; of all of it where the viewpoint is not known.
+   */
+  double visible;
+  /**
+   * Share of the model's whole surface that lies on the scene's, 0 to 1.
+   */
+  double overlap;
+  /**
+   * Root mean square of the distances there, in the scans' unit.
+   */
+  double rms;
+  /**
+   * Number of free directions.
+   */
+  size_t free_direction_count;
+  /**
+   * Motions of the model, in the scene's coordinates, that what is seen does not determine; NaN beyond the last.
+   */
+  surfsig_free_direction free_directions[SURFSIG_FREE_DIRECTIONS];
+  /**
+   * Number of the scene's points that are the instance's.
+   */
+  size_t point_count;
+} surfsig_instance;
 
 /**
  * A sphere, in the coordinates of the moments.
@@ -390,39 +517,6 @@ typedef struct {
 } surfsig_surface_point;
 
 /**
- * A scan: its points, and what is known of where they were seen from.
- */
-typedef struct {
-  /**
-   * The points.
-   */
-  const surfsig_cloud *cloud;
-  /**
-   * Where the sensor stood, in the cloud's coordinates: 3 doubles, finite; null where nobody knows.
-   */
-  const double *viewpoint;
-  /**
-   * In place of a viewpoint: for each point a vector of any length to the side from which it was seen, such as its
-   * normal, (count, 3) floats, packed; null for none.
-   */
-  const float *directions;
-} surfsig_scan;
-
-/**
- * A rotation and a translation: a point p of the source is at R p + t of the target. Written T_target_source, so that
- * T_a_b T_b_c = T_a_c.
- *
- * The matrix is that of Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(transform.matrix), and its
- * transpose that of a column-major matrix. A twist is a rotation vector in radians, and then a translation.
- */
-typedef struct {
-  /**
-   * R and t, and 0, 0, 0, 1: 4 x 4, row by row.
-   */
-  double matrix[16];
-} surfsig_transform;
-
-/**
  * A scan's pose in the map, whose frame is that of the first scan that has one.
  */
 typedef struct {
@@ -444,31 +538,6 @@ typedef struct {
    */
   double covariance[36];
 } surfsig_scan_pose;
-
-/**
- * Told how far work is, some twenty times a second, by the thread that called surfsig; the work itself is done by
- * others meanwhile. Must return, neither by an exception nor by longjmp().
- *
- * @param data What was given with the function.
- * @param done How much is done.
- * @param total Of how much; the same for all calls.
- * @return 0 to go on; anything else stops the work, whose function then returns SURFSIG_CODE_CANCELLED.
- */
-typedef int (*surfsig_progress)(void *data, size_t done, size_t total);
-
-/**
- * A motion that does not change a surface, so that a transform of it is not determined in that direction.
- */
-typedef struct {
-  /**
-   * Unit vector along a translation or a rotation's axis; NaN for rotations about every axis through the point.
-   */
-  double axis[3];
-  /**
-   * A point on the rotation's axis; NaN for a translation.
-   */
-  double point[3];
-} surfsig_free_direction;
 
 /**
  * How a source lies in a target, and how sure that is.
@@ -661,6 +730,133 @@ double surfsig_extraction_radius(const surfsig_extraction *extraction);
  * sign of curvature, is a convention, and for null.
  */
 int surfsig_extraction_oriented(const surfsig_extraction *extraction);
+
+/**
+ * Makes options of the default values: instances with a score of 0.25 at least, all cores.
+ */
+surfsig_find_options *surfsig_find_options_new(void);
+
+/**
+ * Frees options; does nothing with null.
+ */
+void surfsig_find_options_free(surfsig_find_options *options);
+
+/**
+ * Chooses the least score of an instance.
+ *
+ * @param options The options to change.
+ * @param score Above 0 and up to 1, which is as much as can be seen of the model at once with nothing against it; 0
+ * for the default. Half hidden instances have about 0.4, and what is not there below 0.2.
+ */
+surfsig_code surfsig_find_options_set_score(surfsig_find_options *options,
+                                            double score);
+
+/**
+ * Chooses the number of threads. The result is the same, bit for bit.
+ *
+ * @param options The options to change.
+ * @param threads 1 to 1024; 0 for all cores.
+ */
+surfsig_code surfsig_find_options_set_threads(surfsig_find_options *options, uint32_t threads);
+
+/**
+ * Chooses a function that is told the progress, and may stop the preparation or the search.
+ *
+ * @param options The options to change.
+ * @param progress Called with the number of steps done, and of all; null for none.
+ * @param data Given to it; must live as long as the options are used.
+ */
+surfsig_code surfsig_find_options_set_progress(surfsig_find_options *options,
+                                               surfsig_progress progress,
+                                               void *data);
+
+/**
+ * Prepares a model: a whole object, or one view of it.
+ *
+ * @param scan Its points, at least 50 finite ones that lie on a surface. May have directions and a viewpoint: then the
+ * directions say which side is the outer one. A viewpoint alone says so where all points can have been seen from there.
+ * @param options How many threads, and who is told the progress; null for the default.
+ * @param model Where the result is put; null is put there where the call fails.
+ */
+surfsig_code surfsig_model_new(const surfsig_scan *scan,
+                               const surfsig_find_options *options,
+                               surfsig_model **model);
+
+/**
+ * Frees a model; does nothing with null.
+ */
+void surfsig_model_free(surfsig_model *model);
+
+/**
+ * Number of the model's finite points; 0 for null.
+ */
+size_t surfsig_model_size(const surfsig_model *model);
+
+/**
+ * Radius of the patches that describe the model, in its unit: 0.4 times the median distance of its points from their
+ * middle, and 8 times their spacing at least; NaN for null.
+ */
+double surfsig_model_radius(const surfsig_model *model);
+
+/**
+ * Median distance of the model's points to their nearest other ones, in its unit; NaN for null. Where it is many times
+ * that of the scene's points, the two may be in different units.
+ */
+double surfsig_model_spacing(const surfsig_model *model);
+
+/**
+ * Finds every instance of models in a scene. That there is none is no failure.
+ *
+ * Each place of the scene proposes a transform by the place of a model whose field signature is most similar. Those that
+ * many agree on are fitted to the scene's surface and judged by what the sensor saw: what of the model is confirmed by
+ * points, less what it saw through and where it saw nothing. The best is taken, with its points, and the others are
+ * judged again without these. The result is always the same.
+ *
+ * @param models What is looked for, each in the scene's unit; null only if count is 0.
+ * @param count How many they are.
+ * @param scene The scene; it may have directions and a viewpoint. Free space counts where all points can have been seen
+ * from the viewpoint, or from the origin of the scene's coordinates where none is given; otherwise only what is
+ * confirmed does, and a higher score leaves out what is there by chance. Points at (0, 0, 0), as sensors write them
+ * where they measured nothing, must not be among its points: NaN may.
+ * @param options How; null for the default.
+ * @param instances Where the result is put; null is put there where the call fails.
+ */
+surfsig_code surfsig_find_instances(const surfsig_model *const *models,
+                                    size_t count,
+                                    const surfsig_scan *scene,
+                                    const surfsig_find_options *options,
+                                    surfsig_instances **instances);
+
+/**
+ * Frees instances and their indices; does nothing with null.
+ */
+void surfsig_instances_free(surfsig_instances *instances);
+
+/**
+ * Number of instances; 0 for null.
+ */
+size_t surfsig_instances_size(const surfsig_instances *instances);
+
+/**
+ * Gives an instance.
+ *
+ * @param instances The instances.
+ * @param index Number of an instance, from 0.
+ * @param instance Where the result is put.
+ */
+surfsig_code surfsig_instances_get(const surfsig_instances *instances,
+                                   size_t index,
+                                   surfsig_instance *instance);
+
+/**
+ * Numbers of the scene's points that are an instance's, ascending: (point_count) numbers that live as long as the
+ * instances. Null for an instance that is none.
+ *
+ * @param instances The instances.
+ * @param index Number of an instance, from 0.
+ */
+const uint32_t *surfsig_instances_indices(const surfsig_instances *instances,
+                                          size_t index);
 
 /**
  * The name of a surfsig_surface_kind, such as "cylinder"; null for a number that is none. Never to be freed.

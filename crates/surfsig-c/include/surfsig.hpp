@@ -465,6 +465,7 @@ private:
 
 } // namespace surfsig
 
+#include <surfsig_finding.hpp>
 #include <surfsig_registration.hpp>
 
 #endif // SURFSIG_HPP

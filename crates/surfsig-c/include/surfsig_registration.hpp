@@ -51,6 +51,9 @@ public:
   Scan(const Cloud &cloud, const Vector &viewpoint) : cloud_(&cloud), viewpoint_(viewpoint), seen_(true) {}
   /** Each point has a vector to its side, such as its normal: (count, 3) floats, packed. */
   Scan(const Cloud &cloud, const float *directions) : cloud_(&cloud), directions_(directions) {}
+  /** Both, for models and for scenes in which they are looked for. */
+  Scan(const Cloud &cloud, const Vector &viewpoint, const float *directions)
+      : cloud_(&cloud), viewpoint_(viewpoint), seen_(true), directions_(directions) {}
   surfsig_scan get() const { return {cloud_->get(), seen_ ? viewpoint_.data() : nullptr, directions_}; }
 
 private:

@@ -12,6 +12,8 @@ mod code;
 #[macro_use]
 mod columns;
 mod extraction;
+mod find_options;
+mod finding;
 mod kind;
 mod moments;
 mod odometry;
@@ -30,6 +32,8 @@ pub use cloud::*;
 pub use code::*;
 pub use columns::{Declaration, Table};
 pub use extraction::*;
+pub use find_options::*;
+pub use finding::*;
 pub use kind::*;
 pub use moments::*;
 pub use odometry::*;

@@ -18,7 +18,7 @@ pub struct surfsig_scan {
     /// Where the sensor stood, in the cloud's coordinates: 3 doubles, finite; null where nobody knows.
     pub viewpoint: *const f64,
     /// In place of a viewpoint: for each point a vector of any length to the side from which it was seen, such as its
-    /// normal, (count, 3) floats, packed; null for none.
+    /// normal, (count, 3) floats, packed; null for none. Models and scenes in which they are looked for may have both.
     pub directions: *const f32,
 }
 
@@ -26,6 +26,21 @@ impl surfsig_scan {
     /// # Safety
     /// Each pointer is null or points to what its comment says, for as long as the result lives.
     pub(crate) unsafe fn checked<'a>(&self, name: &str) -> Result<Scan<'a>, Failure> {
+        // SAFETY: the condition is the same.
+        let scan = unsafe { self.with_both(name) }?;
+        if scan.viewpoint.is_some() && scan.directions.is_some() {
+            return Err(Failure::invalid_input(format!(
+                "{name}: viewpoint and directions exclude each other"
+            )));
+        }
+        Ok(scan)
+    }
+
+    /// The same of a scan that may have a viewpoint and directions.
+    ///
+    /// # Safety
+    /// Each pointer is null or points to what its comment says, for as long as the result lives.
+    pub(crate) unsafe fn with_both<'a>(&self, name: &str) -> Result<Scan<'a>, Failure> {
         // SAFETY: the condition is the same.
         let cloud = given(unsafe { self.cloud.as_ref() }).map_err(|failure| failure.of(name))?.view();
         let viewpoint = if self.viewpoint.is_null() {
@@ -46,11 +61,6 @@ impl surfsig_scan {
             // SAFETY: the condition is the same; a cloud's count has been checked when it was made.
             Some(unsafe { array(self.directions.cast::<[f32; 3]>(), cloud.len(), "directions") }?)
         };
-        if viewpoint.is_some() && directions.is_some() {
-            return Err(Failure::invalid_input(format!(
-                "{name}: viewpoint and directions exclude each other"
-            )));
-        }
         Ok(Scan { cloud, viewpoint, directions })
     }
 }
@@ -74,6 +84,15 @@ impl surfsig_free_direction {
             FreeDirection::Rotation { axis, point } => Self { axis, point },
             FreeDirection::RotationAboutPoint { point } => Self { point, ..Self::NONE },
         }
+    }
+
+    /// NaN beyond the last.
+    pub(crate) fn array_of(directions: &[FreeDirection]) -> [Self; SURFSIG_FREE_DIRECTIONS] {
+        let mut all = [Self::NONE; SURFSIG_FREE_DIRECTIONS];
+        for (place, direction) in all.iter_mut().zip(directions) {
+            *place = Self::of(direction);
+        }
+        all
     }
 }
 
@@ -116,10 +135,6 @@ impl surfsig_registration {
     fn of(found: &Registration) -> Self {
         let mut covariance = [f64::NAN; 36];
         covariance.copy_from_slice(found.covariance.as_flattened());
-        let mut free_directions = [surfsig_free_direction::NONE; SURFSIG_FREE_DIRECTIONS];
-        for (place, direction) in free_directions.iter_mut().zip(&found.free_directions) {
-            *place = surfsig_free_direction::of(direction);
-        }
         Self {
             found: found.T_target_source.is_some(),
             trusted: found.trusted,
@@ -127,7 +142,7 @@ impl surfsig_registration {
             covariance,
             center: found.center,
             free_direction_count: found.free_directions.len(),
-            free_directions,
+            free_directions: surfsig_free_direction::array_of(&found.free_directions),
             matches: found.matches,
             inliers: found.inliers,
             overlap: found.overlap,

@@ -130,14 +130,12 @@ pub fn prepare_model<'py>(
 /// Find instances of models; see `surfsig.find_instances`. Of each, by the names of its attributes, with the number of
 /// its model.
 #[pyfunction]
-#[pyo3(signature = (models, scene, *, min_score, free_space_viewpoint=None, settings=None, threads=None, progress=None))]
-#[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
+#[pyo3(signature = (models, scene, *, min_score, settings=None, threads=None, progress=None))]
 pub fn find_instances<'py>(
     py: Python<'py>,
     models: Vec<ModelArgument<'py>>,
     scene: ScanArgument<'py>,
     min_score: f64,
-    free_space_viewpoint: Option<[f64; 3]>,
     settings: Option<FindSettings>,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
@@ -149,9 +147,7 @@ pub fn find_instances<'py>(
     settings.min_score = min_score;
     settings.threads = threads;
     let total = 2 + FIND_STEPS_PER_MODEL * models.len();
-    let work = |monitor: &Monitor| {
-        surfsig::find_instances(&models, &scene, free_space_viewpoint, &settings, monitor)
-    };
+    let work = |monitor: &Monitor| surfsig::find_instances(&models, &scene, &settings, monitor);
     let found = watched(py, Some(total), progress.as_ref(), work)?;
     found.into_iter().map(|instance| to_python(py, instance)).collect()
 }

@@ -13,6 +13,7 @@ mod python_file;
 mod registration;
 mod settings;
 mod surfaces;
+mod visibility;
 mod watched;
 
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
@@ -79,6 +80,8 @@ mod _surfsig {
     use crate::registration::{RegistrationSettings, consistent_directions, free_directions, register};
     #[pymodule_export]
     use crate::surfaces::find_surfaces;
+    #[pymodule_export]
+    use crate::visibility::{hidden_from, measured_from_origin};
 
     use pyo3::prelude::*;
     use pyo3::types::IntoPyDict;

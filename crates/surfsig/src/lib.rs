@@ -87,7 +87,7 @@ pub use field::{
     FieldSignature, KeypointOptions, field_distinctiveness, field_pools, field_signatures, find_keypoints,
     match_fields,
 };
-pub use finding::{FIND_STEPS_PER_MODEL, FindSettings, Instance, Model, find_instances};
+pub use finding::{FIND_STEPS_PER_MODEL, FindSettings, Instance, MODEL_STEPS, Model, find_instances};
 pub use fit::{
     Cylinder, FitAxes, FitKind, FitUsed, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere,
 };
@@ -113,5 +113,7 @@ pub use spacing::point_spacing;
 pub use status::Status;
 pub use surfaces::{FEWEST_SURFACE_POINTS, FoundSurface, FoundSurfaces, SurfaceOptions, find_surfaces};
 pub use threads::with_threads;
-pub use visibility::{RangeImageSettings, SphericalRangeImage, Visibility};
+pub use visibility::{
+    RangeImageSettings, SphericalRangeImage, Visibility, all_seen_from, hidden_from, measured_from_origin,
+};
 pub use voxels::voxel_means;

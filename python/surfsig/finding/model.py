@@ -13,7 +13,7 @@ from surfsig import _surfsig
 from surfsig.arguments import thread_count
 from surfsig.extraction import Status
 from surfsig.field import FieldSignatures
-from surfsig.finding.scan import Scan, scan_argument
+from surfsig.finding.scan import scan_argument
 from surfsig.point_cloud import PointCloud
 
 Array = NDArray[np.float64]
@@ -71,9 +71,9 @@ def model_of(data: PointCloud | ArrayLike, threads: int | None = None) -> Model:
     InvalidInputError
         If it has too few points, no extent, or no surface.
     """
-    found = _surfsig.prepare_model(
-        scan_argument(Scan.of_model(PointCloud.of(data))), threads=thread_count(threads)
-    )
+    cloud = PointCloud.of(data)
+    scan = scan_argument(cloud.at(np.flatnonzero(cloud.finite)))
+    found = _surfsig.prepare_model(scan, threads=thread_count(threads))
     places = found.pop("places")
     count = len(places["points"])
     signatures = FieldSignatures(

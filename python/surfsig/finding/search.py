@@ -17,10 +17,11 @@ from surfsig.errors import InvalidInputError
 from surfsig.finding.instances import Instance, Instances
 from surfsig.finding.library import Library, stored_model
 from surfsig.finding.model import Model, model_of
-from surfsig.finding.scan import Scan, scan_argument
+from surfsig.finding.scan import scan_argument
 from surfsig.missing_returns import missing_returns, missing_returns_text
 from surfsig.point_cloud import PointCloud
 from surfsig.resolution import warn_if_too_coarse
+from surfsig.spacing import point_spacing
 from surfsig.units import ratio_text
 
 _FEWEST = 50
@@ -93,13 +94,12 @@ def find_instances(
     if len(numbers) < _FEWEST or not models:
         return Instances([], given, {})
     warn_if_too_coarse(given, max(part.radius for part in models.values()), "the scene: patches")
-    scan = Scan.of_scene(given.at(numbers))
+    cloud = given.at(numbers)
     names = list(models)
     found = _surfsig.find_instances(
         [part.argument() for part in models.values()],
-        scan_argument(scan),
+        scan_argument(cloud),
         min_score=min_score,
-        free_space_viewpoint=None if scan.viewpoint is None else scan.viewpoint.tolist(),
         settings=settings,
         threads=threads,
         progress=progress_callback(progress),
@@ -110,9 +110,10 @@ def find_instances(
         name, indices = names[values.pop("model")], numbers[values.pop("indices")]
         instances.append(Instance(name=name, free_directions=free, indices=indices, **values))
     if not instances:
+        spacing = point_spacing(cloud.points)
         for name, part in models.items():
             relation = "has points {ratio} times as far apart as"
-            hint = ratio_text(part.spacing, scan.spacing, (f"the model '{name}'", "the scene"), relation)
+            hint = ratio_text(part.spacing, spacing, (f"the model '{name}'", "the scene"), relation)
             if hint is not None:
                 warnings.warn(f"nothing was found, and {hint}", stacklevel=2)
     seen = {instance.name for instance in instances}

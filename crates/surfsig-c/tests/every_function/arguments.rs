@@ -47,10 +47,6 @@ pub fn clouds(called: &mut Called) {
     call!(called, surfsig_cloud_free(None));
 }
 
-unsafe extern "C" fn stop(_data: *mut c_void, _done: usize, _total: usize) -> c_int {
-    1
-}
-
 pub fn options(called: &mut Called) {
     call!(called, surfsig_options_set_axes(None, 0) gives INVALID);
     call!(called, surfsig_options_set_fit(None, 0) gives INVALID);

@@ -39,16 +39,16 @@ fn sphere() -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// A cloud of the test's own points, freed at its end.
-struct Cloud(*mut surfsig_cloud);
+/// A cloud, freed at its end, with the points that it refers to.
+struct Cloud(*mut surfsig_cloud, #[expect(dead_code, reason = "the cloud refers to them")] Vec<[f64; 3]>);
 
 impl Cloud {
     fn of(points: &[[f64; 3]]) -> Self {
-        let mut made = null_mut();
+        let (mut made, points) = (null_mut(), points.to_vec());
         let code =
             unsafe { surfsig_cloud_new_f64(points.as_ptr().cast(), points.len(), 24, null(), &mut made) };
         assert_eq!(code, OK);
-        Self(made)
+        Self(made, points)
     }
 
     fn get(&self) -> Option<&surfsig_cloud> {
@@ -60,6 +60,11 @@ impl Drop for Cloud {
     fn drop(&mut self) {
         surfsig_cloud_free(owned(self.0));
     }
+}
+
+/// A progress function that stops at once.
+unsafe extern "C" fn stop(_data: *mut c_void, _done: usize, _total: usize) -> c_int {
+    1
 }
 
 /// What C gives to a function that frees.
@@ -102,6 +107,7 @@ macro_rules! null_of_null {
 
 // After the macros, which they use.
 mod arguments;
+mod finding;
 mod fits;
 mod poses;
 mod results;
@@ -120,6 +126,9 @@ fn no_function_of_the_header_fails_but_by_a_code() {
     poses::registration_options(&mut called);
     poses::registrations(&mut called);
     poses::odometries(&mut called);
+    finding::options(&mut called);
+    finding::models(&mut called);
+    finding::instances(&mut called);
 
     let header = Path::new(env!("CARGO_MANIFEST_DIR")).join("include/surfsig.h");
     let text = std::fs::read_to_string(header).unwrap();

@@ -3,10 +3,6 @@
 use crate::*;
 use std::mem::MaybeUninit;
 
-unsafe extern "C" fn stop(_data: *mut c_void, _done: usize, _total: usize) -> c_int {
-    1
-}
-
 pub fn registration_options(called: &mut Called) {
     call!(called, surfsig_registration_options_set_radius(None, 1.0) gives INVALID);
     call!(called, surfsig_registration_options_set_keypoints(None, 1) gives INVALID);

@@ -14,7 +14,7 @@ mod samples;
 mod scene;
 mod settings;
 
-pub use model::Model;
+pub use model::{MODEL_STEPS, Model};
 pub use result::Instance;
 pub use settings::FindSettings;
 
@@ -33,9 +33,10 @@ pub const FIND_STEPS_PER_MODEL: usize = 3;
 
 /// Finds every instance of models in a scene; the best first. There may be none.
 ///
-/// `free_space_viewpoint` is where the sensor stood if all points of the scene were seen from there: then what a model
-/// has where the sensor saw through, or saw nothing, speaks against it. The result is the same whatever the number of
-/// threads.
+/// Where all points of the scene can have been seen from its viewpoint (from the origin of its coordinates, if none is
+/// given: most sensors are there), what a model has where the sensor saw through, or saw nothing, speaks against it. A
+/// scene may have directions besides a viewpoint; then they alone say on which side of its surface the sensor was. The
+/// result is the same whatever the number of threads.
 ///
 /// # Errors
 /// [`Error::InvalidModel`] for a model whose arrays do not belong together, [`Error::InvalidRadius`] for coordinates of
@@ -59,7 +60,7 @@ pub const FIND_STEPS_PER_MODEL: usize = 3;
 /// let seen: Vec<[f64; 3]> =
 ///     egg.iter().filter(|p| p[0] > 0.1).map(|p| truth.transform_point(*p)).collect();
 /// let scene = Scan::new(PointCloud::new_f64(&seen));
-/// let found = find_instances(&[&model], &scene, None, &FindSettings::default(), &Monitor::default())?;
+/// let found = find_instances(&[&model], &scene, &FindSettings::default(), &Monitor::default())?;
 /// assert_eq!(found.len(), 1);
 /// let off = (truth.inverse() * found[0].T_scene_model).log();
 /// assert!(off.iter().all(|component| component.abs() < 0.02));
@@ -68,7 +69,6 @@ pub const FIND_STEPS_PER_MODEL: usize = 3;
 pub fn find_instances(
     models: &[&Model],
     scene: &Scan<'_>,
-    free_space_viewpoint: Option<[f64; 3]>,
     settings: &FindSettings,
     monitor: &Monitor,
 ) -> Result<Vec<Instance>, Error> {
@@ -80,7 +80,7 @@ pub fn find_instances(
         if scan.points.len() < MIN_POINTS || models.is_empty() {
             return Ok(Vec::new());
         }
-        let mut scene = Scene::new(scan, free_space_viewpoint, radius, settings, monitor)?;
+        let mut scene = Scene::new(scan, radius, settings, monitor)?;
         monitor.add(1);
         let mut candidates = Vec::new();
         for (number, model) in models.iter().enumerate() {

@@ -5,6 +5,7 @@ use crate::depth_image::SurfacePlace;
 use crate::kd_tree::KdTree;
 use crate::scan::CenteredScan;
 use crate::spacing::point_spacing;
+use crate::visibility::all_seen_from;
 use crate::{Error, FieldPlaces, Monitor, Scan, with_threads};
 
 /// Radius of the patches in units of the median distance of the model's points from their centre.
@@ -17,6 +18,9 @@ pub(super) const SPACINGS_PER_RADIUS: f64 = 8.0;
 const CLOSED: f64 = 0.2;
 /// Points without which there is nothing to find.
 pub(super) const MIN_POINTS: usize = 50;
+
+/// Steps of [`Model::new`] that [`Monitor::done`] counts.
+pub const MODEL_STEPS: usize = 2;
 
 /// What [`crate::find_instances`] looks for. Coordinates are about `center`, so that all digits are kept.
 ///
@@ -53,7 +57,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// Prepares a model: a whole object, or one view of it. Its patches get a radius by its size.
+    /// Prepares a model: a whole object, or one view of it. Its patches get a radius by its size. A viewpoint counts where
+    /// all points can have been seen from there, and there are no directions.
     ///
     /// # Errors
     /// [`Error::InvalidModel`] where it has too few points, no extent or no surface; [`Error::Threads`],
@@ -73,14 +78,20 @@ impl Model {
         if radius == 0.0 {
             return Err(Error::InvalidModel("a model's points must not all be at one place".into()));
         }
-        if scan.scan().is_oriented() {
-            return Self::described(scan, radius, spacing, true, monitor);
+        let is_known =
+            |&viewpoint: &_| scan.directions.is_none() && all_seen_from(viewpoint, &scan.points, spacing);
+        let mut scan = CenteredScan { viewpoint: scan.viewpoint.filter(is_known), ..scan };
+        let mut is_sided = scan.scan().is_oriented();
+        if !is_sided {
+            scan = oriented_outwards(scan, radius, monitor)?;
+            // What goes all around has its volume inside.
+            let directions = scan.directions.as_ref();
+            is_sided = directions.is_some_and(|all| !all.is_empty() && mean_length(all.iter()) < CLOSED);
         }
-        let scan = oriented_outwards(scan, radius, monitor)?;
-        // What goes all around has its volume inside.
-        let is_closed =
-            scan.directions.as_ref().is_some_and(|all| !all.is_empty() && mean_length(all.iter()) < CLOSED);
-        Self::described(scan, radius, spacing, is_closed, monitor)
+        monitor.add(1);
+        let model = Self::described(scan, radius, spacing, is_sided, monitor)?;
+        monitor.add(1);
+        Ok(model)
     }
 
     fn described(

@@ -8,7 +8,7 @@ use crate::geometry::RigidTransform;
 /// ```
 /// use surfsig::{find_instances, FindSettings, Instance, Monitor, PointCloud, Scan};
 /// let scene = Scan::new(PointCloud::new(&[]));
-/// let found: Vec<Instance> = find_instances(&[], &scene, None, &FindSettings::default(), &Monitor::default())?;
+/// let found: Vec<Instance> = find_instances(&[], &scene, &FindSettings::default(), &Monitor::default())?;
 /// assert!(found.is_empty());
 /// # Ok::<(), surfsig::Error>(())
 /// ```

@@ -7,6 +7,7 @@ use crate::alignment::OrientedSurface;
 use crate::depth_image::{DepthImage, SurfacePlace};
 use crate::scan::CenteredScan;
 use crate::spacing::point_spacing;
+use crate::visibility::all_seen_from;
 use crate::voxels::Voxels;
 use crate::{Error, FieldPlaces, Monitor};
 use nalgebra::Vector3;
@@ -60,22 +61,25 @@ pub(super) struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    /// `radius` is that of patches over which the surface's side is told where the sensor does not.
+    /// `radius` is that of patches over which the surface's side is told where the sensor does not. Without a viewpoint
+    /// the origin of the scan's coordinates is one, where all points can have been seen from there.
     pub fn new(
         scan: CenteredScan,
-        free_space_viewpoint: Option<[f64; 3]>,
         radius: f64,
         settings: &'a FindSettings,
         monitor: &'a Monitor,
     ) -> Result<Self, Error> {
+        let spacing = point_spacing(&scan.points);
+        let viewpoint = scan.viewpoint.unwrap_or_else(|| scan.center.map(|x| -x));
+        let viewpoint = all_seen_from(viewpoint, &scan.points, spacing).then_some(viewpoint);
+        let scan = CenteredScan { viewpoint: viewpoint.filter(|_| scan.directions.is_none()), ..scan };
         let is_oriented = scan.scan().is_oriented();
-        let viewpoint = free_space_viewpoint.map(|point| [0, 1, 2].map(|k| point[k] - scan.center[k]));
         let scan = if is_oriented { scan } else { oriented_outwards(scan, radius, monitor)? };
         Ok(Self {
-            spacing: point_spacing(&scan.points),
+            spacing,
             scan,
             is_oriented,
-            viewpoint: viewpoint.filter(|_| is_oriented),
+            viewpoint,
             settings,
             monitor,
             samples: Vec::new(),

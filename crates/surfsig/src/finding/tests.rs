@@ -67,8 +67,8 @@ fn found_in(
     assert!(model.is_sided && model.is_closed());
     let scan = Scan::new(PointCloud::new_f64(points)).seen_from(viewpoint);
     let settings = FindSettings { threads, ..Default::default() };
-    let found = find_instances(&[&model], &scan, Some(viewpoint), &settings, &monitor)?;
-    assert_eq!(monitor.done(), 2 + FIND_STEPS_PER_MODEL);
+    let found = find_instances(&[&model], &scan, &settings, &monitor)?;
+    assert_eq!(monitor.done(), MODEL_STEPS + 2 + FIND_STEPS_PER_MODEL);
     Ok(found)
 }
 
@@ -199,7 +199,7 @@ fn free_space_speaks_against_what_is_not_there() {
     let scan = CenteredScan::new(&Scan::new(PointCloud::new_f64(&points)).seen_from(viewpoint));
     let model = model_of(body(1500));
     let monitor = Monitor::default();
-    let mut prepared = Scene::new(scan, Some(viewpoint), 1.0, &settings, &monitor).unwrap();
+    let mut prepared = Scene::new(scan, 1.0, &settings, &monitor).unwrap();
     let surface = prepared.fine_surface(0.15).unwrap();
     let center = RigidTransform::from_rotation_vector([0.0; 3], prepared.scan.center);
     let about = |pose: RigidTransform| center.inverse() * pose;
@@ -209,6 +209,41 @@ fn free_space_speaks_against_what_is_not_there() {
     let judged = view.judged(&transforms, &vec![true; surface.samples().len()]);
     assert!(judged[0].score > 0.5 && judged[1].score > 0.5, "{judged:?}");
     assert!(judged[2].score < 0.0, "{judged:?}");
+}
+
+#[test]
+fn a_viewpoint_counts_where_all_can_have_been_seen_from_it() {
+    let (settings, monitor) = (FindSettings::default(), Monitor::default());
+    let viewpoint = [0.5, -3.0, 14.0];
+    let points: Vec<[f64; 3]> =
+        scene(viewpoint).0.iter().map(|point| [0, 1, 2].map(|k| point[k] - viewpoint[k])).collect();
+    let scan = Scan::new(PointCloud::new_f64(&points));
+    let prepared = |scan: &Scan<'_>| Scene::new(CenteredScan::new(scan), 1.0, &settings, &monitor).unwrap();
+    let (given, assumed) = (prepared(&scan.seen_from([0.0; 3])), prepared(&scan));
+    assert!(given.is_oriented && given.viewpoint == Some(given.scan.center.map(|x| -x)));
+    assert_eq!(assumed.viewpoint, given.viewpoint, "most sensors are at the origin of their own coordinates");
+    // The floor hides all else from below.
+    let below = [0.0, 0.0, -30.0];
+    let wrong = prepared(&scan.seen_from(below));
+    assert!(!wrong.is_oriented && wrong.viewpoint.is_none());
+    let upwards = vec![[0.0, 0.0, 1.0]; points.len()];
+    let both = prepared(&scan.seen_from([0.0; 3]).facing(&upwards));
+    assert!(both.is_oriented && both.viewpoint == given.viewpoint && both.scan.viewpoint.is_none());
+
+    let whole: Vec<[f64; 3]> = body(3000).into_iter().map(|(point, _)| point).collect();
+    let one_view: Vec<[f64; 3]> = whole.iter().copied().filter(|point| point[0] > 0.5).collect();
+    let sides = [
+        (&whole, None),
+        (&whole, Some([9.0, 0.0, 0.0])),
+        (&one_view, None),
+        (&one_view, Some([9.0, 0.0, 0.0])),
+    ]
+    .map(|(points, viewpoint)| {
+        let scan = Scan { viewpoint, ..Scan::new(PointCloud::new_f64(points)) };
+        Model::new(&scan, None, &monitor).unwrap().is_sided
+    });
+    // One view has an outer side by its viewpoint only, a whole body by its volume.
+    assert_eq!(sides, [true, true, false, true]);
 }
 
 #[test]
@@ -226,14 +261,14 @@ fn mistakes_are_told() {
     let whole = model_of(body(300));
     let mut damaged = whole.clone();
     damaged.normals.pop();
-    assert!(find_instances(&[&whole], &none, None, &settings, &monitor).unwrap().is_empty());
-    let error = find_instances(&[&damaged], &none, None, &settings, &monitor).unwrap_err();
+    assert!(find_instances(&[&whole], &none, &settings, &monitor).unwrap().is_empty());
+    let error = find_instances(&[&damaged], &none, &settings, &monitor).unwrap_err();
     assert!(matches!(error, Error::InvalidModel(_)));
     let stopped = Monitor::default();
     stopped.cancel();
     let points: Vec<[f64; 3]> = body(3000).into_iter().map(|(point, _)| point).collect();
     let scene = Scan::new(PointCloud::new_f64(&points));
-    let error = find_instances(&[&whole], &scene, None, &settings, &stopped).unwrap_err();
+    let error = find_instances(&[&whole], &scene, &settings, &stopped).unwrap_err();
     assert_eq!(error, Error::Cancelled);
     let sphere = [[1.0_f32, 0.0, 0.0], [-1.0, 0.0, 0.0]];
     assert_eq!((mean_length(sphere.iter()), mean_length([].iter())), (0.0, 0.0));

@@ -1,5 +1,10 @@
-//! What a sensor saw: whether a point is on what it measured, in the free space before it, or hidden behind.
+//! What a sensor saw: whether a point is on what it measured, in the free space before it, or hidden behind; and
+//! whether a viewpoint can be true.
 
+mod hidden;
+mod possible_viewpoint;
 mod spherical_range_image;
 
+pub use hidden::hidden_from;
+pub use possible_viewpoint::{all_seen_from, measured_from_origin};
 pub use spherical_range_image::{RangeImageSettings, SphericalRangeImage, Visibility};
