@@ -182,7 +182,8 @@ fn instance(
         T_scene_model: to_scene * translated(models[fitted.sought.number].center).inverse(),
         covariance: (both * fit.covariance * both.transpose()).into(),
         center: to_scene.transform_point(fit.center),
-        score: evidence.score,
+        // Of a scene that several sensors saw more may be confirmed than one can see at once.
+        score: evidence.score.min(1.0),
         visible: evidence.visible,
         overlap: evidence.overlap,
         rms: fit.rms,
