@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.progress import Progress
 from segmentation_methods import METHODS, SEED, Method, cgal_program, pyransac3d_program
 from segmentation_score import SurfaceScore, TableScore, score_surfaces, score_table
-from segmentation_truth import Model, TableScene, read_models, read_tables, with_noise
+from segmentation_truth import Model, TableScene, read_models, read_tables, with_noise, with_share
 
 MODEL_COLUMNS = (
     "method", "F1", "typed F1", "kind share", "radius error, median", "radii matched", "found / known",
@@ -63,6 +63,7 @@ def measure(plan: argparse.Namespace, console: Console) -> Results:
         "seed": SEED,
         "clouds": len(models),
         "models": {},
+        "sparse": {},
         "tables": [],
     }
     with Progress(console=console, transient=True) as progress:
@@ -70,6 +71,10 @@ def measure(plan: argparse.Namespace, console: Console) -> Results:
             noisy = [with_noise(model, noise, SEED) for model in models]
             what = f"noise {noise:g}"
             results["models"][str(noise)] = [run_method(each, noisy, progress, what) for each in methods]
+        for share in plan.shares if models else ():
+            sparse = [with_share(model, share, SEED) for model in models]
+            what = f"{share:.0%} of the points"
+            results["sparse"][str(share)] = [run_method(each, sparse, progress, what) for each in methods]
         if tables:
             results["tables"] = [run_method(each, tables, progress, "tables") for each in methods]
     return results
@@ -130,6 +135,9 @@ def markdown(results: Results, detail: bool) -> str:
         title = "without noise" if float(noise) == 0 else f"with noise of {float(noise):.1%} of the diagonal"
         parts.append(f"### Fit4CAD, {title} (clouds: {results['clouds']})")
         parts.append(markdown_table(MODEL_COLUMNS, rows(entries, MODEL_COLUMNS, detail)))
+    for share, entries in results["sparse"].items():
+        parts.append(f"### Fit4CAD, {float(share):.0%} of the points (clouds: {results['clouds']})")
+        parts.append(markdown_table(MODEL_COLUMNS, rows(entries, MODEL_COLUMNS, detail)))
     if results["tables"]:
         parts.append("### Labelled tables")
         parts.append(markdown_table(TABLE_COLUMNS, rows(results["tables"], TABLE_COLUMNS, detail)))
@@ -161,12 +169,17 @@ def read_arguments() -> argparse.Namespace:
         default=[0.0, 0.001],
         help="shares of the diagonal (default: 0 0.001)",
     )
+    parser.add_argument(
+        "--shares", type=float, nargs="*", default=[0.1], help="of the points, without noise (default: 0.1)"
+    )
     parser.add_argument("--only", nargs="+", default=[], metavar="CLOUD", help="such as PC1 or learn0")
     parser.add_argument("--detail", action="store_true", help="add a row for each cloud")
     parser.add_argument("--write", action="store_true", help="update BENCHMARKS.md and segmentation.json")
     arguments = parser.parse_args()
     if min(arguments.noise) < 0:
         parser.error("noise is not negative")
+    if not all(0 < share <= 1 for share in arguments.shares):
+        parser.error("shares are above 0, and at most 1")
     return arguments
 
 

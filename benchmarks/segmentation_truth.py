@@ -115,6 +115,17 @@ def with_noise(model: Model, share: float, seed: int) -> Model:
     return replace(model, cloud=surfsig.PointCloud(points + noise))
 
 
+def with_share(model: Model, share: float, seed: int) -> Model:
+    """Return the model with some of its points, each as likely as any other."""
+    count = len(model.cloud)
+    kept = np.sort(np.random.default_rng(seed).choice(count, round(share * count), replace=False))
+    place = np.full(count, -1)
+    place[kept] = np.arange(len(kept))
+    segments = [replace(each, points=place[each.points][place[each.points] >= 0]) for each in model.segments]
+    cloud = surfsig.PointCloud(model.cloud.points[kept])
+    return Model(model.name, cloud, tuple(each for each in segments if len(each.points)))
+
+
 def diagonal(points: NDArray[np.floating]) -> float:
     """Return the diagonal of the box around finite points."""
     return float(np.linalg.norm(np.ptp(points, axis=0)))

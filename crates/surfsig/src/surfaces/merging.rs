@@ -102,7 +102,8 @@ pub(super) fn assign(scene: &mut Scene, regions: &mut [Region]) {
     }
 }
 
-fn relabel(scene: &mut Scene, regions: &[Region]) {
+/// Labels the members of each surface by its number, and no other point.
+pub(super) fn relabel(scene: &mut Scene, regions: &[Region]) {
     scene.labels.fill(NONE);
     for (number, region) in regions.iter().enumerate() {
         for &member in &region.members {

@@ -1,13 +1,14 @@
 //! Which parts of a scan are planes, spheres, cylinders, cones and tori.
 //!
 //! [`scene`] knows each point's neighbours, normal and noise; [`growth`] lets a [`crate::Primitive`] grow, [`merging`]
-//! joins what is one and shares out what lies between.
+//! joins what is one and shares out what lies between; [`unexplained`] looks again among the points that are left.
 
 mod graph;
 mod growth;
 mod likeness;
 mod merging;
 mod scene;
+mod unexplained;
 
 use crate::primitive::{SurfaceKind, Vector, uncertainty};
 use crate::{Error, Monitor, PointCloud, with_threads};
@@ -113,7 +114,7 @@ pub fn find_surfaces(
     monitor: &Monitor,
 ) -> Result<FoundSurfaces, Error> {
     with_threads(options.threads, || {
-        let Some(mut scene) = Scene::new(cloud, options.noise, monitor)? else {
+        let Some(mut scene) = Scene::new(cloud, options.noise, LOCAL, monitor)? else {
             return Ok(FoundSurfaces { labels: vec![NONE; cloud.len()], surfaces: Vec::new() });
         };
         let fewest =
@@ -121,11 +122,18 @@ pub fn find_surfaces(
         // The simplest first, in whatever order they were asked for.
         let wanted = |kind: &SurfaceKind| options.kinds.is_empty() || options.kinds.contains(kind);
         let kinds: Vec<SurfaceKind> = SurfaceKind::ALL.into_iter().filter(wanted).collect();
-        let mut regions = regions(&mut scene, &kinds, fewest, monitor)?;
-        merging::merge(&mut scene, &mut regions);
-        merging::assign(&mut scene, &mut regions);
-        // Some may have lost their points to a nearer one.
-        regions.retain(|region| region.members.len() >= fewest);
+        let mut regions = regions(&mut scene, &kinds, fewest, &LEVELS, monitor)?;
+        let share_out = |scene: &mut Scene, regions: &mut Vec<Region>| {
+            merging::merge(scene, regions);
+            merging::assign(scene, regions);
+            // Some may have lost their points to a nearer one.
+            regions.retain(|region| region.members.len() >= fewest);
+            merging::relabel(scene, regions);
+        };
+        share_out(&mut scene, &mut regions);
+        if unexplained::add(&mut scene, &mut regions, &kinds, fewest, monitor)? {
+            share_out(&mut scene, &mut regions);
+        }
         Ok(assembled(cloud.len(), &scene, &kinds, regions))
     })?
 }
@@ -135,14 +143,15 @@ fn regions(
     scene: &mut Scene,
     kinds: &[SurfaceKind],
     fewest: usize,
+    levels: &[usize],
     monitor: &Monitor,
 ) -> Result<Vec<Region>, Error> {
     let count = scene.points.len();
     let (mut seen, mut inside) = (Stamps::new(count), Stamps::new(count));
     let mut regions = Vec::new();
-    let mut unknown = scene.is_unknown();
-    for level in LEVELS {
-        if level > LOCAL {
+    let mut unknown = scene.is_noise_unknown();
+    for &level in levels {
+        if level > levels[0] {
             scene.look_farther(level, monitor)?;
         }
         let seed = |point: usize| scene.labels[point] == NONE && scene.noise[point].is_finite();
