@@ -65,9 +65,9 @@ def surfaces_command(
 
     Nothing needs to be set. The output has the input's points and fields, and surface (its number, -1 for
     none), surface_kind and point_class (1 plane, 2 cylinder, 3 sphere, 4 cone, 5 torus, 6 saddle, 7 edge,
-    8 free form, 0 unknown), confidence (0 to 1), and red, green, blue by surface. With --recurrences it has
-    piece and recurrence, the numbers of what hangs together and of the group of pieces that show the same
-    object (-1 for none), and JSON has their poses.
+    8 free form, 0 unknown), confidence (0 to 1), deviation (signed distance from its surface), and red,
+    green, blue by surface. With --recurrences it has piece and recurrence, the numbers of what hangs
+    together and of the group of pieces that show the same object (-1 for none), and JSON has their poses.
 
     \b
     Examples:

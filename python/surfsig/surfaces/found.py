@@ -16,7 +16,7 @@ from surfsig import _surfsig
 from surfsig.colors import GREY, distinct_colors
 from surfsig.point_cloud import PointCloud
 from surfsig.shapes.surface import Surface
-from surfsig.surfaces.classes import PointClass, classify
+from surfsig.surfaces.classes import PointClass, classify, deviations_of
 from surfsig.surfaces.wording import HEADER, table_rows
 
 if TYPE_CHECKING:
@@ -53,7 +53,18 @@ class Surfaces:
 
     @cached_property
     def _classified(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        return classify(self.cloud, self.labels, self.surfaces, noise=self.noise, threads=self.threads)
+        return classify(
+            self.cloud,
+            self.labels,
+            self.surfaces,
+            self._deviations,
+            noise=self.noise,
+            threads=self.threads,
+        )
+
+    @cached_property
+    def _deviations(self) -> NDArray[np.float64]:
+        return deviations_of(self.cloud, self.labels, self.surfaces)
 
     @property
     def classes(self) -> NDArray[np.uint8]:
@@ -76,6 +87,17 @@ class Surfaces:
         saddle, the probability that both curvatures have their sign; of a free form, what that lacks to 1.
         """
         return self._classified[1]
+
+    def deviations(self) -> NDArray[np.float64]:
+        """Give how far each point is from its own surface: a scalar field of the scan.
+
+        Returns
+        -------
+        numpy.ndarray
+            Signed distances (n,), in the scan's unit: positive outside, or where a plane's normal points; NaN
+            for points of no surface.
+        """
+        return self._deviations.copy()
 
     def summary(self) -> str:
         """Say in words how many surfaces of each kind there are.
@@ -114,7 +136,7 @@ class Surfaces:
         Returns
         -------
         (n,) arrays: surface (its number, -1 for none), surface_kind (its kind as a `PointClass`, 0 for none),
-        point_class, confidence.
+        point_class, confidence, deviation (signed distance from its surface, NaN for none).
         """
         in_surface = self.labels >= 0
         return {
@@ -122,6 +144,7 @@ class Surfaces:
             "surface_kind": np.where(in_surface, self.classes, PointClass.UNKNOWN).astype(np.uint8),
             "point_class": self.classes,
             "confidence": self.confidence,
+            "deviation": self._deviations.astype(np.float32),
         }
 
     def to_pandas(self) -> pd.DataFrame:
@@ -155,7 +178,8 @@ class Surfaces:
     def write_report(self, path: str | Path, *, title: str = "Surfaces") -> None:
         """Write one HTML page: the points coloured by surface, in a view that turns, and a table with errors.
 
-        The page needs no network. Of many points 60,000 are drawn.
+        A button colours them by their distance from the surface, on a scale that is symmetric about 0 and as
+        wide as 95 % of the distances. The page needs no network. Of many points 60,000 are drawn.
 
         Parameters
         ----------
