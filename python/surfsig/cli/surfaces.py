@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     metavar="KIND,...",
     help="Which to look for: plane, sphere, cylinder, cone, torus.  [default: all]",
 )
+@click.option("--csv", "csv_file", type=CLOUD, metavar="FILE.csv", help="Write the table of surfaces as CSV.")
+@click.option("--excel", type=CLOUD, metavar="FILE.xlsx", help="Write the table of surfaces for Excel.")
 @click.option("--recurrences", is_flag=True, help="Say which objects and surfaces occur more than once, too.")
 @input_options
 @threads_option
@@ -56,6 +58,8 @@ def surfaces_command(
     min_points: int | None,
     noise: float | None,
     kinds: list[str] | None,
+    csv_file: Path | None,
+    excel: Path | None,
     recurrences: bool,
     threads: int | None,
     quiet: bool,
@@ -74,12 +78,16 @@ def surfaces_command(
       surfsig surfaces scan.pcd
       surfsig surfaces scan.pcd --recurrences
       surfsig surfaces scan.pcd -o labelled.ply --report report.html
+      surfsig surfaces scan.pcd --csv table.csv --excel table.xlsx
       surfsig surfaces part.ply --unit mm --kinds plane,cylinder --json - | jq '.surfaces[].radius'
     """  # noqa: D301
     import surfsig
     from surfsig.missing_returns import warn_of_missing_returns
+    from surfsig.surfaces.table import excel_library
 
-    on_stdout = check_results(output, json_file, report)
+    on_stdout = check_results(output, json_file, report, csv_file, excel)
+    if excel is not None:
+        excel_library()
     shown = on_terminal() and not quiet
     with progress_bar("reading", "bytes", shown=shown) as progress:
         cloud = surfsig.read(file, progress=progress, **reading)
@@ -107,6 +115,10 @@ def surfaces_command(
             surfsig.write(output, cloud, columns, progress=progress)
     if report is not None:
         found.write_report(report, title=f"Surfaces of {file.name}")
+    if csv_file is not None:
+        found.write_csv(csv_file)
+    if excel is not None:
+        found.write_excel(excel)
     if on_stdout:
         print_json(_values(file, found, recurring))
     elif json_file is not None:

@@ -17,6 +17,7 @@ from surfsig.colors import GREY, distinct_colors
 from surfsig.point_cloud import PointCloud
 from surfsig.shapes.surface import Surface
 from surfsig.surfaces.classes import PointClass, classify, deviations_of
+from surfsig.surfaces.table import table_columns, write_csv, write_excel
 from surfsig.surfaces.wording import HEADER, table_rows
 
 if TYPE_CHECKING:
@@ -164,16 +165,44 @@ class Surfaces:
         from surfsig.convert.libraries import library
 
         pandas = library("pandas", "pandas", "pandas")
-        columns: dict[str, Any] = {"kind": [surface.kind for surface in self]}
-        columns |= {name: self._numbers(name) for name in ("radius", "radius_std")}
-        intervals = np.array([surface.interval for surface in self]).reshape(-1, 2)
-        columns |= dict(zip(("radius_low", "radius_high"), intervals.T, strict=True))
-        columns |= {name: self._numbers(name) for name in ("major_radius", "half_angle")}
-        for name in ("center", "axis"):
-            vectors = self._numbers(name).reshape(-1, 3)
-            columns |= {f"{name}_{letter}": vectors[:, i] for i, letter in enumerate("xyz")}
-        columns |= {name: self._numbers(name) for name in ("length", "width", "arc", "area", "count", "rms")}
-        return pandas.DataFrame(columns)
+        return pandas.DataFrame(table_columns(self.surfaces))
+
+    def write_csv(self, path: str | Path) -> None:
+        """Write the table of `to_pandas` as text with commas, the surfaces' numbers first.
+
+        A value that a kind does not have is left empty. The file is whole or as it was before.
+
+        Parameters
+        ----------
+        path
+            Where to write.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
+        """
+        write_csv(self.surfaces, path)
+
+    def write_excel(self, path: str | Path) -> None:
+        """Write the table of `to_pandas` as an Excel workbook (.xlsx), the surfaces' numbers first.
+
+        Needs XlsxWriter (`pip install surfsig[excel]`). A value that a kind does not have is an empty cell.
+        The file is whole or as it was before.
+
+        Parameters
+        ----------
+        path
+            Where to write.
+
+        Raises
+        ------
+        InvalidInputError
+            If XlsxWriter is not installed.
+        OSError
+            If it cannot be written.
+        """
+        write_excel(self.surfaces, path)
 
     def write_report(self, path: str | Path, *, title: str = "Surfaces") -> None:
         """Write one HTML page: the points coloured by surface, in a view that turns, and a table with errors.
@@ -206,9 +235,6 @@ class Surfaces:
         if finite < _surfsig.FEWEST_SURFACE_POINTS:
             return f"{finite:,} points are too few"
         return f"of {finite:,} points too few lie on any one surface, within the noise around them"
-
-    def _numbers(self, name: str) -> NDArray[Any]:
-        return np.array([getattr(surface, name) for surface in self])
 
 
 def _plural(word: str, count: int) -> str:
