@@ -53,7 +53,15 @@ from surfsig.odometry import Odometry, ScanStatus, estimate_odometry
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import EqualSurfaces, Piece, Recurrence, Recurrences, find_recurrences
 from surfsig.registration import Registration, register
-from surfsig.shapes import FormError, SurfaceAngle, SurfaceDistance, fit_cylinder, fit_plane, fit_sphere
+from surfsig.shapes import (
+    FormError,
+    SurfaceAngle,
+    SurfaceDistance,
+    SurfacePatch,
+    fit_cylinder,
+    fit_plane,
+    fit_sphere,
+)
 from surfsig.signature_similarity import flip_signatures, similarity, similarity_class, similarity_matrix
 from surfsig.surfaces import PointClass, Surface, Surfaces, find_surfaces
 from surfsig.units import unit_mismatch
@@ -93,6 +101,7 @@ __all__ = [
     "Surface",
     "SurfaceAngle",
     "SurfaceDistance",
+    "SurfacePatch",
     "Surfaces",
     "SurfsigError",
     "TimedScan",

@@ -44,6 +44,12 @@ if TYPE_CHECKING:
     metavar="KIND,...",
     help="Which to look for: plane, sphere, cylinder, cone, torus.  [default: all]",
 )
+@click.option(
+    "--export",
+    type=CLOUD,
+    metavar="FILE",
+    help="Write the bounded surfaces as meshes: a .glb, .obj or .dxf file.",
+)
 @click.option("--csv", "csv_file", type=CLOUD, metavar="FILE.csv", help="Write the table of surfaces as CSV.")
 @click.option("--excel", type=CLOUD, metavar="FILE.xlsx", help="Write the table of surfaces for Excel.")
 @click.option("--recurrences", is_flag=True, help="Say which objects and surfaces occur more than once, too.")
@@ -58,6 +64,7 @@ def surfaces_command(
     min_points: int | None,
     noise: float | None,
     kinds: list[str] | None,
+    export: Path | None,
     csv_file: Path | None,
     excel: Path | None,
     recurrences: bool,
@@ -78,14 +85,17 @@ def surfaces_command(
       surfsig surfaces scan.pcd
       surfsig surfaces scan.pcd --recurrences
       surfsig surfaces scan.pcd -o labelled.ply --report report.html
-      surfsig surfaces scan.pcd --csv table.csv --excel table.xlsx
+      surfsig surfaces scan.pcd --export model.glb --csv table.csv
       surfsig surfaces part.ply --unit mm --kinds plane,cylinder --json - | jq '.surfaces[].radius'
     """  # noqa: D301
     import surfsig
     from surfsig.missing_returns import warn_of_missing_returns
+    from surfsig.surfaces.export import check_export
     from surfsig.surfaces.table import excel_library
 
-    on_stdout = check_results(output, json_file, report, csv_file, excel)
+    on_stdout = check_results(output, json_file, report, export, csv_file, excel)
+    if export is not None:
+        check_export(export)
     if excel is not None:
         excel_library()
     shown = on_terminal() and not quiet
@@ -127,6 +137,9 @@ def surfaces_command(
         print_columns(f"{file}: {found.summary()}", *found.table())
     if recurring is not None and not on_stdout and not quiet:
         print_columns(f"{file}: {recurring.summary()}", *recurring.table())
+    # The last, for where no surface was found there is none to write, which is an error.
+    if export is not None:
+        found.export(export)
 
 
 def _values(file: Path, found: Surfaces, recurring: Recurrences | None) -> dict[str, Any]:

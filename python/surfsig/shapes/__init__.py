@@ -15,6 +15,7 @@ from surfsig.progress import ProgressCallback
 from surfsig.resolution import warn_if_surface_is_lost
 from surfsig.shapes.form_error import FormError
 from surfsig.shapes.growth import grown
+from surfsig.shapes.patch import SurfacePatch
 from surfsig.shapes.relation import SurfaceAngle, SurfaceDistance
 from surfsig.shapes.robust import fitted_to_inliers
 from surfsig.shapes.surface import KINDS, Kind, Surface, measured_surface
@@ -28,6 +29,7 @@ __all__ = [
     "Surface",
     "SurfaceAngle",
     "SurfaceDistance",
+    "SurfacePatch",
     "fit_cylinder",
     "fit_plane",
     "fit_sphere",

@@ -17,6 +17,7 @@ from surfsig.point_cloud import PointCloud
 from surfsig.shapes.area import covered_area
 from surfsig.shapes.form_error import FormError, form_error
 from surfsig.shapes.geometry import Array, Placement, covered_arc, in_plane
+from surfsig.shapes.patch import SurfacePatch, patch_of
 from surfsig.shapes.relation import SurfaceAngle, SurfaceDistance, angle_between, distance_between
 
 Kind = Literal["plane", "sphere", "cylinder", "cone", "torus"]
@@ -235,6 +236,29 @@ class Surface:
             If the cloud has fewer points than the surface was fitted to.
         """
         return form_error(self, PointCloud.of(cloud))
+
+    def patch(self, cloud: PointCloud | ArrayLike) -> SurfacePatch:
+        """Make a mesh of the part of the surface that its members cover.
+
+        On a map of the surface, cells as wide as it is far to 32 neighbours are joined where they have
+        points; so holes and outlines are as fine as these cells.
+
+        Parameters
+        ----------
+        cloud
+            What the surface was fitted to.
+
+        Returns
+        -------
+        SurfacePatch
+            Vertices, all on the surface, and triangles.
+
+        Raises
+        ------
+        InvalidInputError
+            If the cloud has fewer points than the surface was fitted to.
+        """
+        return patch_of(self, PointCloud.of(cloud))
 
     def to_dict(self) -> dict[str, Any]:
         """Name all values, as JSON and tables call them, without those that the kind does not have.

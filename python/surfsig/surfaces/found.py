@@ -17,6 +17,7 @@ from surfsig.colors import GREY, distinct_colors
 from surfsig.point_cloud import PointCloud
 from surfsig.shapes.surface import Surface
 from surfsig.surfaces.classes import PointClass, classify, deviations_of
+from surfsig.surfaces.export import export
 from surfsig.surfaces.table import table_columns, write_csv, write_excel
 from surfsig.surfaces.wording import HEADER, table_rows
 
@@ -203,6 +204,28 @@ class Surfaces:
             If it cannot be written.
         """
         write_excel(self.surfaces, path)
+
+    def export(self, path: str | Path) -> None:
+        """Write the bounded surfaces as meshes: GLB, OBJ or DXF, by the path's ending.
+
+        Each surface is an object of its own colour and named by number and kind ("3 cylinder"); in DXF a
+        polyface mesh on a layer of that name. Coordinates are the scan's, in its unit, and not turned: where
+        a program expects y upwards (as glTF says) or metres, it must be told. Needs trimesh, or of DXF ezdxf
+        (`pip install surfsig[export]`). The file is whole or as it was before.
+
+        Parameters
+        ----------
+        path
+            Where to write; ends in .glb, .obj or .dxf.
+
+        Raises
+        ------
+        InvalidInputError
+            If the ending is another one, the library is not installed, or there is no surface.
+        OSError
+            If it cannot be written.
+        """
+        export(self, path)
 
     def write_report(self, path: str | Path, *, title: str = "Surfaces") -> None:
         """Write one HTML page: the points coloured by surface, in a view that turns, and a table with errors.

@@ -1,0 +1,244 @@
+"""The part of a surface that its points cover, as a mesh: cells of a map that have points, joined."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfsig.geometry import axes_across
+from surfsig.shapes.area import cell_width, unrolled
+from surfsig.shapes.geometry import Array, directions_of, middle_direction
+from surfsig.shapes.overlap import member_points
+
+if TYPE_CHECKING:
+    from surfsig.point_cloud import PointCloud
+    from surfsig.shapes.surface import Surface
+
+Faces = NDArray[np.int64]
+
+_MOST_CELLS = 2000
+"""Along one side of the map: of points of very uneven density the cells would be more than memory holds."""
+
+_FEWEST_AROUND = 8
+"""Cells around a full turn, so that what is opposite is never in neighbouring cells."""
+
+_LARGEST_STEP = math.radians(10.0)
+"""By which a face may turn about an axis or center; a chord's middle is then 0.1 % of the radius inside."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePatch:
+    """The bounded part of a surface as a mesh of triangles: `Surface.patch`."""
+
+    origin: Array
+    """(3,): where the vertices are counted from, so that they keep their digits far from 0: the surface's
+    `center`."""
+    vertices: Array
+    """(v, 3), less the origin; all are on the surface."""
+    faces: Faces
+    """(f, 3), numbers of vertices, counterclockwise as seen from outside or from where the normal points."""
+
+    @property
+    def area(self) -> float:
+        """The sum of the triangles' areas."""
+        corners = self.vertices[self.faces]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return float(0.5 * np.linalg.norm(across, axis=1).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class _Chart:
+    """A map of a surface: two coordinates, each a length or an angle."""
+
+    flat: Array
+    """(n, 2), the points' coordinates."""
+    sizes: tuple[float, float]
+    """Of a unit of each coordinate, as a length: 1, or of an angle its radius."""
+    turns: tuple[bool, bool]
+    """Which coordinates are angles, the same after a full turn."""
+    bends: tuple[float, float]
+    """By how many radians the surface turns along a unit of each coordinate, at most."""
+    lifted: Callable[[Array, Array], Array]
+    """Takes coordinates back to points (n, 3) of the surface, less its point."""
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """The cells along one coordinate: their centers are at start, start + step, ..., count of them."""
+
+    start: float
+    step: float
+    count: int
+    is_angle: bool
+    closed: bool = False
+    """Whether the cells go round: the first one follows the last."""
+
+
+def patch_of(surface: Surface, cloud: PointCloud) -> SurfacePatch:
+    """Make the mesh; see `Surface.patch`."""
+    offset = surface.center - surface.point
+    points = member_points(surface, cloud) + offset
+    chart = _chart(surface, points)
+    side = cell_width(unrolled(surface._placement, points))
+    first, second = (_grid(chart, coordinate, side) for coordinate in (0, 1))
+    triangles = _triangles(_occupied(chart.flat, first, second), first, second)
+    if not len(triangles):
+        # Points along a line have no cells side by side: then the whole of the map counts.
+        triangles = _triangles(np.ones((first.count, second.count), np.bool_), first, second)
+    bend = max(abs(chart.bends[0]) * first.step, abs(chart.bends[1]) * second.step)
+    halvings = math.ceil(math.log2(max(1.0, bend / _LARGEST_STEP)))
+    corners = _subdivided(triangles, halvings)
+    fine = 2**halvings
+    for column, grid in enumerate((first, second)):
+        if grid.closed:
+            corners[..., column] %= grid.count * fine
+    lattice, numbers = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
+    along = [grid.start + grid.step / fine * lattice[:, i] for i, grid in enumerate((first, second))]
+    return SurfacePatch(
+        surface.center, chart.lifted(*along) - offset, numbers.reshape(-1, 3).astype(np.int64)
+    )
+
+
+def _chart(surface: Surface, points: Array) -> _Chart:
+    """Choose the map of a kind; the points are less the surface's point."""
+    if surface.kind == "plane":
+        return _plane_chart(surface, points)
+    if surface.kind == "sphere":
+        return _sphere_chart(surface, points)
+    placement, axis = surface._placement, surface.axis
+    first, second = axes_across(axis)
+    turns, heights, away = placement.turns(points), placement.heights(points), placement.away(points)
+    radius, major, slope = surface.radius, surface.major_radius, math.tan(surface.half_angle)
+
+    def around(turn: Array, distance: Array | float, height: Array) -> Array:
+        outward = np.outer(np.cos(turn), first) + np.outer(np.sin(turn), second)
+        return np.asarray(np.reshape(distance, (-1, 1)) * outward + np.outer(height, axis))
+
+    if surface.kind == "torus":
+        tube = np.arctan2(heights, away - major)
+        return _Chart(
+            np.column_stack([turns, tube]),
+            (major, radius),
+            (True, True),
+            (1.0, 1.0),
+            lambda turn, t: around(turn, major + radius * np.cos(t), radius * np.sin(t)),
+        )
+    if surface.kind == "cone":
+        return _Chart(
+            np.column_stack([turns, heights]),
+            (float(away.mean()), 1.0 / math.cos(surface.half_angle)),
+            (True, False),
+            (1.0, 0.0),
+            lambda turn, height: around(turn, radius + slope * height, height),
+        )
+    return _Chart(
+        np.column_stack([turns, heights]),
+        (radius, 1.0),
+        (True, False),
+        (1.0, 0.0),
+        lambda turn, height: around(turn, radius, height),
+    )
+
+
+def _plane_chart(surface: Surface, points: Array) -> _Chart:
+    """Lay the coordinates along the points' principal axes, so that a strip is not across the cells."""
+    axes = np.stack(axes_across(surface.axis))
+    flat = points @ axes.T
+    principal = np.linalg.eigh(np.cov(flat.T))[1][:, ::-1]
+    # A right-handed pair, so that faces are seen counterclockwise from the normal's side.
+    principal[:, 1] *= np.sign(np.linalg.det(principal))
+    axes = principal.T @ axes
+    return _Chart(
+        points @ axes.T,
+        (1.0, 1.0),
+        (False, False),
+        (0.0, 0.0),
+        lambda x, y: np.asarray(np.outer(x, axes[0]) + np.outer(y, axes[1])),
+    )
+
+
+def _sphere_chart(surface: Surface, points: Array) -> _Chart:
+    """Take Lambert's azimuthal map about the middle of the points; its rim is the opposite point."""
+    radius, middle = surface.radius, middle_direction(directions_of(points))
+    axes = np.stack(axes_across(middle))
+
+    def lifted(x: Array, y: Array) -> Array:
+        flat = np.column_stack([x, y]) / radius
+        # The distance on the map is 2 sin(angle / 2); cells at the rim may have their centers beyond it.
+        distance = np.linalg.norm(flat, axis=1, keepdims=True)
+        angle = 2.0 * np.arcsin(np.minimum(0.5 * distance, 1.0))
+        beside = flat / np.where(distance > 0.0, distance, 1.0) @ axes
+        return np.asarray(radius * (np.cos(angle) * middle + np.sin(angle) * beside))
+
+    flat = unrolled(surface._placement, points)
+    return _Chart(flat, (1.0, 1.0), (False, False), (1.0 / radius, 1.0 / radius), lifted)
+
+
+def _grid(chart: _Chart, coordinate: int, side: float) -> _Grid:
+    """Divide a coordinate, so that the centers of the first and last cells are where its points end."""
+    values, size = chart.flat[:, coordinate], chart.sizes[coordinate]
+    if chart.turns[coordinate]:
+        count = max(_FEWEST_AROUND, min(_MOST_CELLS, math.floor(2.0 * math.pi * size / side)))
+        step = 2.0 * math.pi / count
+        ordered = np.sort(values)
+        gaps = np.diff(ordered, append=ordered[0] + 2.0 * math.pi)
+        widest = int(gaps.argmax())
+        if gaps[widest] < step:
+            return _Grid(0.0, step, count, is_angle=True, closed=True)
+        start = float(ordered[(widest + 1) % len(ordered)])
+        extent = 2.0 * math.pi - float(gaps[widest])
+    else:
+        start, extent = float(values.min()), float(np.ptp(values))
+    intervals = max(1, min(_MOST_CELLS, round(extent * size / side)))
+    step = extent / intervals if extent > 0.0 else side / size
+    return _Grid(start, step, intervals + 1, is_angle=chart.turns[coordinate])
+
+
+def _occupied(flat: Array, first: _Grid, second: _Grid) -> NDArray[np.bool_]:
+    """Tell which cells have points."""
+    cells = []
+    for values, grid in zip(flat.T, (first, second), strict=True):
+        from_start = values - grid.start
+        if grid.is_angle:
+            # Angles run on from half a cell before the first center.
+            from_start = (from_start + 0.5 * grid.step) % (2.0 * math.pi) - 0.5 * grid.step
+        numbers = np.round(from_start / grid.step).astype(np.int64)
+        cells.append(numbers % grid.count if grid.closed else np.clip(numbers, 0, grid.count - 1))
+    occupied = np.zeros((first.count, second.count), np.bool_)
+    occupied[cells[0], cells[1]] = True
+    return occupied
+
+
+def _triangles(occupied: NDArray[np.bool_], first: _Grid, second: _Grid) -> Faces:
+    """Join the centers of neighbouring cells that have points: two faces between four, one between three.
+
+    Cells at the border reach beyond it by half on average, so that their centers are at the border.
+    """
+    # What follows the last cell of a full turn is the first.
+    wrapped = np.pad(occupied, ((0, int(first.closed)), (0, int(second.closed))), mode="wrap")
+    square = [wrapped[:-1, :-1], wrapped[1:, :-1], wrapped[1:, 1:], wrapped[:-1, 1:]]
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    count = np.sum(square, axis=0)
+    faces = []
+    for names, chosen in [
+        ((0, 1, 2), count == 4),
+        ((0, 2, 3), count == 4),
+        *(([i for i in range(4) if i != missing], (count == 3) & ~square[missing]) for missing in range(4)),
+    ]:
+        faces.append(np.argwhere(chosen)[:, None] + corners[list(names)])
+    return np.concatenate(faces)
+
+
+def _subdivided(triangles: Faces, halvings: int) -> Faces:
+    """Cut each triangle into four at the middles of its sides, some times; coordinates double each time."""
+    for _ in range(halvings):
+        a, b, c = (2 * triangles).swapaxes(0, 1)
+        ab, bc, ca = (a + b) // 2, (b + c) // 2, (c + a) // 2
+        parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        triangles = np.concatenate([np.stack(part, axis=1) for part in parts])
+    return triangles
