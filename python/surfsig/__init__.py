@@ -63,7 +63,15 @@ from surfsig.shapes import (
     fit_sphere,
 )
 from surfsig.signature_similarity import flip_signatures, similarity, similarity_class, similarity_matrix
-from surfsig.surfaces import PointClass, Surface, Surfaces, find_surfaces
+from surfsig.surfaces import (
+    PipeJoint,
+    PipeRun,
+    PipeSegment,
+    PointClass,
+    Surface,
+    Surfaces,
+    find_surfaces,
+)
 from surfsig.units import unit_mismatch
 
 __all__ = [
@@ -89,6 +97,9 @@ __all__ = [
     "Odometry",
     "OdometrySettings",
     "Piece",
+    "PipeJoint",
+    "PipeRun",
+    "PipeSegment",
     "PointClass",
     "PointCloud",
     "Recurrence",

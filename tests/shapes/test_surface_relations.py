@@ -7,51 +7,10 @@ from typing import Any
 import drawn_shapes
 import numpy as np
 import pytest
+from made_surfaces import made, moved
 from surface_points import UTM, Array, rotation
 
-import surfsig
 from surfsig import InvalidInputError, PointCloud, Surface, fit_cylinder, fit_plane, fit_sphere
-from surfsig.shapes.surface import PARAMETERS, Kind
-
-NAN3 = np.full(3, math.nan)
-
-
-def made(kind: Kind, point: Any, axis: Any = NAN3, radius: float = math.nan, **values: Any) -> Surface:
-    """Give a surface of known place, with errors of 0.001 in each parameter."""
-    direction = np.asarray(axis, np.float64) / np.linalg.norm(axis)
-    position = np.asarray(point, np.float64)
-    across = np.full((2, 3), math.nan)
-    if kind != "sphere":
-        across = np.stack(surfsig.geometry.axes_across(direction))
-    given: dict[str, Any] = {
-        "kind": kind,
-        "point": position,
-        "axis": direction,
-        "radius": radius,
-        "major_radius": math.nan,
-        "half_angle": math.nan,
-        "covariance": 1e-6 * np.eye(len(PARAMETERS[kind])),
-        "across": across,
-        "degrees_of_freedom": 20.0,
-        "center": position,
-        "length": 2.0,
-        "width": 1.0,
-        "arc": 2 * math.pi,
-        "area": 1.0,
-        "members": np.arange(0),
-        "rms": 0.001,
-        "deviation": 0.001,
-    }
-    return Surface(**{**given, **values})
-
-
-def moved(surface: Surface, turn: Array, offset: Array) -> Surface:
-    """Rotate a surface and translate it."""
-    names = ("point", "center")
-    values = {**vars(surface), **{name: turn @ getattr(surface, name) + offset for name in names}}
-    values |= {"axis": turn @ surface.axis, "across": surface.across @ turn.T}
-    return Surface(**values)
-
 
 FLOOR = made("plane", [0, 0, 0], [0, 0, 1])
 PIPE = made("cylinder", [0, 0, 2], [1, 0, 0], 0.5)

@@ -79,6 +79,8 @@ def surfaces_command(
     8 free form, 0 unknown), confidence (0 to 1), deviation (signed distance from its surface), and red,
     green, blue by surface. With --recurrences it has piece and recurrence, the numbers of what hangs
     together and of the group of pieces that show the same object (-1 for none), and JSON has their poses.
+    Pipes that are joined end to end, by elbows or where their axes meet, are rows of the table and
+    pipe_runs of JSON.
 
     \b
     Examples:
@@ -92,6 +94,7 @@ def surfaces_command(
     from surfsig.missing_returns import warn_of_missing_returns
     from surfsig.surfaces.export import check_export
     from surfsig.surfaces.table import excel_library
+    from surfsig.surfaces.wording import run_rows
 
     on_stdout = check_results(output, json_file, report, export, csv_file, excel)
     if export is not None:
@@ -134,7 +137,8 @@ def surfaces_command(
     elif json_file is not None:
         write_json(json_file, _values(file, found, recurring))
     if len(found) and not on_stdout and not quiet:
-        print_columns(f"{file}: {found.summary()}", *found.table())
+        header, rows = found.table()
+        print_columns(f"{file}: {found.summary()}", header, [*rows, *run_rows(found.pipe_runs())])
     if recurring is not None and not on_stdout and not quiet:
         print_columns(f"{file}: {recurring.summary()}", *recurring.table())
     # The last, for where no surface was found there is none to write, which is an error.
@@ -155,5 +159,6 @@ def _values(file: Path, found: Surfaces, recurring: Recurrences | None) -> dict[
         "points": len(found.cloud),
         "classes": {kind.name.lower(): counts[kind] for kind in PointClass},
         "surfaces": [{"number": number, **surface.to_dict()} for number, surface in enumerate(found)],
+        "pipe_runs": [run.to_dict() for run in found.pipe_runs()],
     }
     return values if recurring is None else values | {"recurrences": recurring.values()}

@@ -267,19 +267,33 @@ def _across_parallel_axes(first: Surface, second: Surface, place: Array) -> Ends
     return ends
 
 
-def _nearest_of_axes(parts: Sequence[Located]) -> Array:
-    """Give the points at which two lines that are not parallel are nearest to each other."""
-    first, second = parts
-    between = second.point - first.point
-    cosine = float(first.axis @ second.axis)
-    sine_squared = float(np.sum(np.cross(first.axis, second.axis) ** 2))
-    ours, theirs = float(between @ first.axis), float(between @ second.axis)
+def nearest_of_axes(first_point: Array, first_axis: Array, second_point: Array, second_axis: Array) -> Array:
+    """Give the points at which two lines are nearest to each other.
+
+    Parameters
+    ----------
+    first_point, first_axis, second_point, second_axis
+        (3,): of each a point and its direction, a unit vector. The lines are not parallel.
+
+    Returns
+    -------
+    (2, 3): on the first and on the second.
+    """
+    between = second_point - first_point
+    cosine = float(first_axis @ second_axis)
+    sine_squared = float(np.sum(np.cross(first_axis, second_axis) ** 2))
+    ours, theirs = float(between @ first_axis), float(between @ second_axis)
     return np.stack(
         [
-            first.point + (ours - cosine * theirs) / sine_squared * first.axis,
-            second.point + (cosine * ours - theirs) / sine_squared * second.axis,
+            first_point + (ours - cosine * theirs) / sine_squared * first_axis,
+            second_point + (cosine * ours - theirs) / sine_squared * second_axis,
         ]
     )
+
+
+def _nearest_of_axes(parts: Sequence[Located]) -> Array:
+    first, second = parts
+    return nearest_of_axes(first.point, first.axis, second.point, second.axis)
 
 
 def _meeting_point(first: Surface, second: Surface) -> Callable[[Sequence[Located]], Array]:

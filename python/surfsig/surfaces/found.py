@@ -18,6 +18,7 @@ from surfsig.point_cloud import PointCloud
 from surfsig.shapes.surface import Surface
 from surfsig.surfaces.classes import PointClass, classify, deviations_of
 from surfsig.surfaces.export import export
+from surfsig.surfaces.pipe_runs import PipeRun, find_pipe_runs
 from surfsig.surfaces.table import table_columns, write_csv, write_excel
 from surfsig.surfaces.wording import HEADER, table_rows
 
@@ -204,6 +205,22 @@ class Surfaces:
             If it cannot be written.
         """
         write_excel(self.surfaces, path)
+
+    def pipe_runs(self) -> list[PipeRun]:
+        """Join the pipes: cylinders of equal radius, end to end.
+
+        Two ends are joined by a torus of the same radius whose circle touches both axes (an elbow), where
+        the axes meet near both ends (a corner: an elbow that is hidden or too short to be found), or where
+        two pieces lie in line. Radii are equal if they differ insignificantly (99 %) or by less than 3 %.
+        Near is within four diameters, which is farther than most elbows and flanges reach; a pipe that goes
+        on past the joint, as at a tee, is not joined there.
+
+        Returns
+        -------
+        list of PipeRun
+            Runs of two segments or more, the longest first; lengths in the scan's unit.
+        """
+        return find_pipe_runs(self.surfaces)
 
     def export(self, path: str | Path) -> None:
         """Write the bounded surfaces as meshes: GLB, OBJ or DXF, by the path's ending.

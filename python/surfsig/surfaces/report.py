@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from surfsig.colors import GREY, distinct_colors
 from surfsig.page import Group, write_page
+from surfsig.surfaces.wording import run_rows
 
 if TYPE_CHECKING:
     from surfsig.surfaces.found import Surfaces
@@ -57,4 +58,4 @@ def write_report(found: Surfaces, path: str | Path, title: str) -> None:
     text = (
         f"{found.summary()}. Lengths are in the scan's unit; a click on a point or a row shows the surface."
     )
-    write_page(path, title, text, groups, header, rows)
+    write_page(path, title, text, groups, header, [*rows, *run_rows(found.pipe_runs())])
