@@ -240,8 +240,9 @@ class Surface:
     def patch(self, cloud: PointCloud | ArrayLike) -> SurfacePatch:
         """Make a mesh of the part of the surface that its members cover.
 
-        On a map of the surface, cells as wide as it is far to 32 neighbours are joined where they have
-        points; so holes and outlines are as fine as these cells.
+        On a map of the surface, cells are joined where they have points. They are as wide as it is far to 32
+        neighbours, or up to four times that where points are in rows or clusters; holes and outlines are as
+        fine as these cells.
 
         Parameters
         ----------
