@@ -16,6 +16,7 @@ from surface_points import UTM, Array
 
 import surfsig
 from surfsig import InvalidInputError, PointCloud, SurfacePatch, Surfaces
+from surfsig.shapes.geodesic import geodesic_sphere, halved
 
 Shell = Callable[..., Finished]
 Parts = dict[str, tuple[Array, NDArray[np.int64]]]
@@ -55,11 +56,12 @@ def test_a_patch_lies_on_its_surface_and_covers_what_its_points_cover(name: str)
         assert (beyond > 0.9e-4).all()
 
 
-def test_a_pipe_is_closed_around_and_a_torus_everywhere() -> None:
-    def open_edges(patch: SurfacePatch) -> int:
-        edges = np.sort(patch.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        return int((np.unique(edges, axis=0, return_counts=True)[1] == 1).sum())
+def open_edges(patch: SurfacePatch) -> int:
+    edges = np.sort(patch.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    return int((np.unique(edges, axis=0, return_counts=True)[1] == 1).sum())
 
+
+def test_a_pipe_is_closed_around_and_a_torus_everywhere() -> None:
     torus = surfsig.find_surfaces(SCENES["torus"])
     assert open_edges(torus[0].patch(torus.cloud)) == 0
     turns, heights = (grid.ravel() for grid in np.meshgrid(np.arange(0, 6.28, 0.05), np.arange(0, 2, 0.05)))
@@ -68,6 +70,33 @@ def test_a_pipe_is_closed_around_and_a_torus_everywhere() -> None:
     ends = np.abs(np.abs(patch.vertices[:, 2]) - 0.975) < 1e-9
     assert open_edges(patch) == ends.sum()
     assert patch.area == pytest.approx(2 * math.pi * 1.95, rel=0.005)
+
+
+@pytest.mark.parametrize("frequency", [1, 2, 5])
+def test_an_icosahedron_is_divided_evenly(frequency: int) -> None:
+    vertices, faces = geodesic_sphere(frequency)
+    assert (len(vertices), len(faces)) == (10 * frequency**2 + 2, 20 * frequency**2)
+    patch = SurfacePatch(np.zeros(3), vertices, faces)
+    assert open_edges(patch) == 0
+    assert (np.sum(normals(patch) * vertices[faces].mean(axis=1), axis=1) > 0.0).all()
+    finer = SurfacePatch(np.zeros(3), *halved(vertices, faces))
+    assert (len(finer.vertices), len(finer.faces)) == (40 * frequency**2 + 2, 80 * frequency**2)
+    assert open_edges(finer) == 0
+    assert patch.area < finer.area < 4 * math.pi
+
+
+def test_a_whole_ball_is_closed_and_one_on_a_stand_is_open_below() -> None:
+    towards = np.random.default_rng(11).normal(size=(6000, 3))
+    points = 2.0 * towards / np.linalg.norm(towards, axis=1, keepdims=True)
+    whole = surfsig.fit_sphere(points).patch(points)
+    assert open_edges(whole) == 0
+    assert whole.area == pytest.approx(16 * math.pi, rel=0.01)
+    kept = points[points[:, 2] > -1.6]
+    surface = surfsig.fit_sphere(kept)
+    stood = surface.patch(kept)
+    assert np.abs(surface.distances(stood.vertices + stood.origin)).max() < 1e-12
+    assert stood.area == pytest.approx(2 * math.pi * 2.0 * 3.6, rel=0.03)
+    assert stood.vertices[:, 2].min() > -1.75
 
 
 def test_holes_and_corners_are_cut_out() -> None:

@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 
 from surfsig.geometry import axes_across
 from surfsig.shapes.area import cell_width, unrolled
+from surfsig.shapes.geodesic import Faces, halved, sphere_with_points
 from surfsig.shapes.geometry import Array, directions_of, middle_direction
 from surfsig.shapes.overlap import member_points
 
 if TYPE_CHECKING:
     from surfsig.point_cloud import PointCloud
     from surfsig.shapes.surface import Surface
-
-Faces = NDArray[np.int64]
 
 _MOST_CELLS = 2000
 """Along one side of the map: of points of very uneven density the cells would be more than memory holds."""
@@ -30,6 +29,9 @@ _FEWEST_AROUND = 8
 _LARGEST_STEP = math.radians(10.0)
 """By which a face may turn about an axis or center; a chord's middle is then 0.1 % of the radius inside."""
 
+
+_WIDE = math.pi
+"""Width of a sphere's points, as seen from its center, from which it is meshed without a map: half of it."""
 
 _COVERED = 0.9
 """Share of the points whose cells must be joined to three others. Of a depth camera's points 0.97 or more are
@@ -97,13 +99,15 @@ def patch_of(surface: Surface, cloud: PointCloud) -> SurfacePatch:
     points = member_points(surface, cloud) + offset
     chart = _chart(surface, points)
     side = cell_width(unrolled(surface._placement, points))
+    if surface.kind == "sphere" and surface.arc > _WIDE:
+        return _wide_sphere(surface, points, side)
     first, second, counts = _cells(chart, side)
     triangles = _triangles(counts > 0, first, second)
     if not len(triangles):
         # Points along a line have no cells side by side: then the whole of the map counts.
         triangles = _triangles(np.ones_like(counts, np.bool_), first, second)
     bend = max(abs(chart.bends[0]) * first.step, abs(chart.bends[1]) * second.step)
-    halvings = math.ceil(math.log2(max(1.0, bend / _LARGEST_STEP)))
+    halvings = _halvings(bend)
     corners = _subdivided(triangles, halvings)
     fine = 2**halvings
     for column, grid in enumerate((first, second)):
@@ -114,6 +118,22 @@ def patch_of(surface: Surface, cloud: PointCloud) -> SurfacePatch:
     return SurfacePatch(
         surface.center, chart.lifted(*along) - offset, numbers.reshape(-1, 3).astype(np.int64)
     )
+
+
+def _wide_sphere(surface: Surface, points: Array, side: float) -> SurfacePatch:
+    """Mesh a sphere without a map, which would be torn at its rim."""
+    steps = [side / surface.radius * 2.0 ** (0.5 * power) for power in range(_WIDTHS)]
+    tried = [(*sphere_with_points(points, step), -step) for step in steps]
+    enough = [mesh for mesh in tried if mesh[2] >= _COVERED]
+    vertices, faces, _, step = enough[0] if enough else max(tried, key=lambda mesh: mesh[2:])
+    for _ in range(_halvings(-step)):
+        vertices, faces = halved(vertices, faces)
+    return SurfacePatch(surface.center, surface.radius * vertices, faces)
+
+
+def _halvings(bend: float) -> int:
+    """Say how often to halve cells that turn by an angle in radians."""
+    return math.ceil(math.log2(max(1.0, bend / _LARGEST_STEP)))
 
 
 def _cells(chart: _Chart, side: float) -> tuple[_Grid, _Grid, Faces]:
