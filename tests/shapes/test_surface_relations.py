@@ -123,6 +123,8 @@ def test_unknown_errors_stay_unknown() -> None:
     found = FLOOR.distance_to(unknown)
     assert (found.value, math.isnan(found.std)) == (1.0, True)
     assert math.isnan(FLOOR.angle_to(unknown).std)
+    assert np.isnan([*found.interval, *FLOOR.angle_to(unknown).interval]).all()
+    assert "std" not in found.to_dict()
 
 
 def test_the_gap_and_parallelism_of_planes_are_those_of_the_part_that_lies_opposite() -> None:

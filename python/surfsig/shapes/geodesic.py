@@ -70,13 +70,17 @@ def geodesic_sphere(frequency: int) -> tuple[Array, Faces]:
         if neighbours[a, b] and neighbours[b, c] and neighbours[a, c]
     ]
     # Places within a triangle, by whole parts of the frequency; and the small triangles between them.
-    place = {
+    position = {
         (i, j): n
         for n, (i, j) in enumerate((i, j) for i in range(frequency + 1) for j in range(frequency + 1 - i))
     }
-    weights = np.array([(frequency - i - j, i, j) for i, j in place]) / frequency
-    small = [[place[i, j], place[i + 1, j], place[i, j + 1]] for i, j in place if i + j < frequency] + [
-        [place[i + 1, j], place[i + 1, j + 1], place[i, j + 1]] for i, j in place if i + j < frequency - 1
+    weights = np.array([(frequency - i - j, i, j) for i, j in position]) / frequency
+    small = [
+        [position[i, j], position[i + 1, j], position[i, j + 1]] for i, j in position if i + j < frequency
+    ] + [
+        [position[i + 1, j], position[i + 1, j + 1], position[i, j + 1]]
+        for i, j in position
+        if i + j < frequency - 1
     ]
     points = (weights @ corners[np.array(faces)]).reshape(-1, 3)
     numbers = (np.array(small) + len(weights) * np.arange(20)[:, None, None]).reshape(-1, 3)

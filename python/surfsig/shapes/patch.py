@@ -27,7 +27,7 @@ _FEWEST_AROUND = 8
 """Cells around a full turn, so that what is opposite is never in neighbouring cells."""
 
 _LARGEST_STEP = math.radians(10.0)
-"""By which a face may turn about an axis or center; a chord's middle is then 0.1 % of the radius inside."""
+"""By which the normal may rotate along a side of a face: its middle is then 0.4 % of the radius inside."""
 
 
 _WIDE = math.pi
@@ -73,10 +73,10 @@ class _Chart:
     """(n, 2), the points' coordinates."""
     sizes: tuple[float, float]
     """Of a unit of each coordinate, as a length: 1, or of an angle its radius."""
-    turns: tuple[bool, bool]
+    are_angles: tuple[bool, bool]
     """Which coordinates are angles, the same after a full turn."""
     bends: tuple[float, float]
-    """By how many radians the surface turns along a unit of each coordinate, at most."""
+    """By how many radians the normal rotates along a unit of each coordinate, at most."""
     lifted: Callable[[Array, Array], Array]
     """Takes coordinates back to points (n, 3) of the surface, less its point."""
 
@@ -132,7 +132,7 @@ def _wide_sphere(surface: Surface, points: Array, side: float) -> SurfacePatch:
 
 
 def _halvings(bend: float) -> int:
-    """Say how often to halve cells that turn by an angle in radians."""
+    """Say how often to halve cells along which the normal rotates by an angle in radians."""
     return math.ceil(math.log2(max(1.0, bend / _LARGEST_STEP)))
 
 
@@ -157,36 +157,36 @@ def _chart(surface: Surface, points: Array) -> _Chart:
         return _sphere_chart(surface, points)
     placement, axis = surface._placement, surface.axis
     first, second = axes_across(axis)
-    turns, heights, away = placement.turns(points), placement.heights(points), placement.away(points)
+    angles, heights, away = placement.turns(points), placement.heights(points), placement.away(points)
     radius, major, slope = surface.radius, surface.major_radius, math.tan(surface.half_angle)
 
-    def around(turn: Array, distance: Array | float, height: Array) -> Array:
-        outward = np.outer(np.cos(turn), first) + np.outer(np.sin(turn), second)
+    def around(angle: Array, distance: Array | float, height: Array) -> Array:
+        outward = np.outer(np.cos(angle), first) + np.outer(np.sin(angle), second)
         return np.asarray(np.reshape(distance, (-1, 1)) * outward + np.outer(height, axis))
 
     if surface.kind == "torus":
         tube = np.arctan2(heights, away - major)
         return _Chart(
-            np.column_stack([turns, tube]),
+            np.column_stack([angles, tube]),
             (major, radius),
             (True, True),
             (1.0, 1.0),
-            lambda turn, t: around(turn, major + radius * np.cos(t), radius * np.sin(t)),
+            lambda angle, t: around(angle, major + radius * np.cos(t), radius * np.sin(t)),
         )
     if surface.kind == "cone":
         return _Chart(
-            np.column_stack([turns, heights]),
+            np.column_stack([angles, heights]),
             (float(away.mean()), 1.0 / math.cos(surface.half_angle)),
             (True, False),
             (1.0, 0.0),
-            lambda turn, height: around(turn, radius + slope * height, height),
+            lambda angle, height: around(angle, radius + slope * height, height),
         )
     return _Chart(
-        np.column_stack([turns, heights]),
+        np.column_stack([angles, heights]),
         (radius, 1.0),
         (True, False),
         (1.0, 0.0),
-        lambda turn, height: around(turn, radius, height),
+        lambda angle, height: around(angle, radius, height),
     )
 
 
@@ -227,7 +227,7 @@ def _sphere_chart(surface: Surface, points: Array) -> _Chart:
 def _grid(chart: _Chart, coordinate: int, side: float) -> _Grid:
     """Divide a coordinate, so that the centers of the first and last cells are where its points end."""
     values, size = chart.flat[:, coordinate], chart.sizes[coordinate]
-    if chart.turns[coordinate]:
+    if chart.are_angles[coordinate]:
         count = max(_FEWEST_AROUND, min(_MOST_CELLS, math.floor(2.0 * math.pi * size / side)))
         step = 2.0 * math.pi / count
         ordered = np.sort(values)
@@ -241,7 +241,7 @@ def _grid(chart: _Chart, coordinate: int, side: float) -> _Grid:
         start, extent = float(values.min()), float(np.ptp(values))
     intervals = max(1, min(_MOST_CELLS, round(extent * size / side)))
     step = extent / intervals if extent > 0.0 else side / size
-    return _Grid(start, step, intervals + 1, is_angle=chart.turns[coordinate])
+    return _Grid(start, step, intervals + 1, is_angle=chart.are_angles[coordinate])
 
 
 def _counts(flat: Array, first: _Grid, second: _Grid) -> Faces:

@@ -92,7 +92,7 @@ class SurfaceAngle:
     degrees_of_freedom: float
     """Of the standard error, for Student's t (Welch and Satterthwaite)."""
     point: Array
-    """(3,): where they meet, in the points' coordinates: of two planes the place on their line nearest to the
+    """(3,): where they meet, in the points' coordinates: of two planes the point of their line nearest to the
     middle between their centers; of two axes the middle between their nearest points. NaN where they
     are exactly parallel."""
     point_std: Array
@@ -219,16 +219,16 @@ def _ends(first: Surface, second: Surface, corners: Array) -> Ends:
     return _centers if first.kind == "sphere" else _foot_on_axis
 
 
-def _across_planes(first: Surface, second: Surface, place: Array) -> Ends:
-    """Measure at a place, along the mean of both normals."""
+def _across_planes(first: Surface, second: Surface, position: Array) -> Ends:
+    """Measure at a position, along the mean of both normals."""
     normal = first.axis + math.copysign(1.0, first.axis @ second.axis) * second.axis
     normal = normal / np.linalg.norm(normal)
-    return lambda parts: np.stack([_on_plane(part, place, normal) for part in parts])
+    return lambda parts: np.stack([_on_plane(part, position, normal) for part in parts])
 
 
-def _on_plane(plane: Located, place: Array, direction: Array) -> Array:
-    """Follow a direction from a place to a plane."""
-    return place + ((plane.point - place) @ plane.axis) / (direction @ plane.axis) * direction
+def _on_plane(plane: Located, position: Array, direction: Array) -> Array:
+    """Follow a direction from a position to a plane."""
+    return position + ((plane.point - position) @ plane.axis) / (direction @ plane.axis) * direction
 
 
 def _foot_on_plane(second: Surface) -> Ends:
@@ -237,8 +237,8 @@ def _foot_on_plane(second: Surface) -> Ends:
 
     def ends(parts: Sequence[Located]) -> Array:
         plane, other = parts
-        place = other.point + (height * other.axis if height else 0.0)
-        return np.stack([place - ((place - plane.point) @ plane.axis) * plane.axis, place])
+        position = other.point + (height * other.axis if height else 0.0)
+        return np.stack([position - ((position - plane.point) @ plane.axis) * plane.axis, position])
 
     return ends
 
@@ -253,14 +253,14 @@ def _centers(parts: Sequence[Located]) -> Array:
     return np.stack([part.point for part in parts])
 
 
-def _across_parallel_axes(first: Surface, second: Surface, place: Array) -> Ends:
-    """Measure where both axes pass a place, across the mean of their directions."""
+def _across_parallel_axes(first: Surface, second: Surface, position: Array) -> Ends:
+    """Measure where both axes pass a position, across the mean of their directions."""
     along = first.axis + math.copysign(1.0, first.axis @ second.axis) * second.axis
     along = along / np.linalg.norm(along)
 
     def ends(parts: Sequence[Located]) -> Array:
         feet = [
-            part.point + ((place - part.point) @ along) / (part.axis @ along) * part.axis for part in parts
+            part.point + ((position - part.point) @ along) / (part.axis @ along) * part.axis for part in parts
         ]
         return np.stack(feet)
 
@@ -305,11 +305,11 @@ def _meeting_point(first: Surface, second: Surface) -> Callable[[Sequence[Locate
     return lambda parts: np.asarray(_nearest_of_axes(parts).mean(axis=0))
 
 
-def _on_both_planes(place: Array, parts: Sequence[Located]) -> Array:
-    """Give the point of two planes' line that is nearest to a place."""
+def _on_both_planes(position: Array, parts: Sequence[Located]) -> Array:
+    """Give the point of two planes' line that is nearest to a position."""
     normals = np.stack([part.axis for part in parts])
-    beside = np.array([(part.point - place) @ part.axis for part in parts])
-    return np.asarray(place + normals.T @ np.linalg.solve(normals @ normals.T, beside))
+    beside = np.array([(part.point - position) @ part.axis for part in parts])
+    return np.asarray(position + normals.T @ np.linalg.solve(normals @ normals.T, beside))
 
 
 def _rotation_between(first: Array, second: Array) -> Array:
@@ -325,8 +325,8 @@ def _parallelism(surfaces: Sequence[Surface], corners: Array, origin: Array) -> 
     nominal = [located(surface, origin) for surface in surfaces]
     ends_at = [_across_planes(first, second, corner)(nominal) for corner in corners]
     gaps = [(end - start) @ first.axis for start, end in ends_at]
-    places = corners[[int(np.argmin(gaps)), int(np.argmax(gaps))]]
-    measured = [_across_planes(first, second, place) for place in places]
+    positions = corners[[int(np.argmin(gaps)), int(np.argmax(gaps))]]
+    measured = [_across_planes(first, second, position) for position in positions]
 
     def difference(parts: Sequence[Located]) -> Array:
         low, high = (np.subtract(*ends(parts)[::-1]) for ends in measured)
@@ -365,7 +365,8 @@ def _interval(value: float, std: float, degrees_of_freedom: float, most: float) 
     from scipy.stats import t
 
     half = std * float(t.ppf(0.5 + 0.5 * INTERVAL, degrees_of_freedom))
-    return max(0.0, value - half), min(most, value + half)
+    # Not Python's own, which would take a bound for NaN.
+    return float(np.maximum(0.0, value - half)), float(np.minimum(most, value + half))
 
 
 def _named(result: object, names: Sequence[str]) -> dict[str, Any]:

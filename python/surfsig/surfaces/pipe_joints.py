@@ -86,7 +86,7 @@ def find_joints(surfaces: Sequence[Surface]) -> list[Joint]:
 
 
 def end_point(surface: Surface, side: int) -> Array:
-    """Give the place on a cylinder's axis at which its points end."""
+    """Give the position on a cylinder's axis at which its points end."""
     return np.asarray(surface.center + 0.5 * side * surface.length * surface.axis)
 
 
@@ -143,7 +143,7 @@ def _at_feet(
     """Join two cylinders at points of their axes, if these are at their ends."""
     # The outside of an elbow may be taken for the pipe, up to a bend radius beyond where it begins.
     bend = 0.0 if torus < 0 else surfaces[torus].major_radius
-    ends, places = [], []
+    ends, positions = [], []
     for number, foot in zip(pair, feet, strict=True):
         if foot is None:
             return []
@@ -154,8 +154,8 @@ def _at_feet(
         if not -_BEYOND * surface.radius - bend <= missing <= _REACH * surface.radius + bend:
             return []
         ends.append(End(number, side))
-        places.append(end_point(surface, side))
-    distance = float(np.linalg.norm(places[1] - places[0]))
+        positions.append(end_point(surface, side))
+    distance = float(np.linalg.norm(positions[1] - positions[0]))
     return [Joint(kind, (ends[0], ends[1]), torus, distance)]
 
 
@@ -163,8 +163,8 @@ def _straight(first: Surface, second: Surface, pair: tuple[int, int]) -> list[Jo
     """Join two cylinders one behind the other."""
     between = second.center - first.center
     sides = (1 if between @ first.axis >= 0.0 else -1, 1 if between @ second.axis < 0.0 else -1)
-    places = [end_point(surface, side) for surface, side in zip((first, second), sides, strict=True)]
-    gap = places[1] - places[0]
+    positions = [end_point(surface, side) for surface, side in zip((first, second), sides, strict=True)]
+    gap = positions[1] - positions[0]
     along = sides[0] * float(gap @ first.axis)
     beside = float(np.linalg.norm(gap - (gap @ first.axis) * first.axis))
     is_near = -_BEYOND * first.radius <= along <= _REACH * first.radius

@@ -149,18 +149,20 @@ def _run(surfaces: Sequence[Surface], entries: Sequence[End], joints: Sequence[J
     def measured(located: Sequence[Located]) -> Array:
         """Give the segments' ends (k, 2, 3), their lengths (k,), and the joints' angles and lengths."""
         of = dict(zip(parts, located, strict=True))
-        places = {
+        positions = {
             end: of[end.cylinder].point + height * of[end.cylinder].axis for end, height in heights.items()
         }
         angles, between = [], []
         for joint in joints:
-            places |= _joined_at(joint, of)
+            positions |= _joined_at(joint, of)
             outward = [end.side * of[end.cylinder].axis for end in joint.ends]
             angles.append(_angle(outward[0], -outward[1]))
-            gap = places[joint.ends[1]] - places[joint.ends[0]]
+            gap = positions[joint.ends[1]] - positions[joint.ends[0]]
             straight = max(0.0, float(gap @ outward[0])) if joint.kind == "straight" else 0.0
             between.append(angles[-1] * of[joint.torus].major_radius if joint.torus >= 0 else straight)
-        ends = np.array([[places[entry], places[End(entry.cylinder, -entry.side)]] for entry in entries])
+        ends = np.array(
+            [[positions[entry], positions[End(entry.cylinder, -entry.side)]] for entry in entries]
+        )
         lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         return np.concatenate([ends.ravel(), lengths, angles, between])
 
@@ -168,21 +170,21 @@ def _run(surfaces: Sequence[Surface], entries: Sequence[End], joints: Sequence[J
     ends, lengths, angles, between = np.split(
         found.value, np.cumsum([6 * len(entries), len(entries), len(joints)])
     )
-    places = ends.reshape(-1, 2, 3) + origin
+    positions = ends.reshape(-1, 2, 3) + origin
     total = np.zeros(len(found.value))
     total[len(ends) : len(ends) + len(lengths)] = total[-len(joints) :] = 1.0
     stds = [found.std_along(unit) for unit in np.eye(len(total))[len(ends) :]]
     segments = [
         PipeSegment(
             surface=number,
-            start=place[0],
-            end=place[1],
+            start=position[0],
+            end=position[1],
             radius=surfaces[number].radius,
             radius_std=surfaces[number].radius_std,
             length=float(length),
             length_std=length_std,
         )
-        for number, place, length, length_std in zip(numbers, places, lengths, stds, strict=False)
+        for number, position, length, length_std in zip(numbers, positions, lengths, stds, strict=False)
     ]
     described = [
         PipeJoint(
