@@ -53,9 +53,25 @@ from surfsig.odometry import Odometry, ScanStatus, estimate_odometry
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import EqualSurfaces, Piece, Recurrence, Recurrences, find_recurrences
 from surfsig.registration import Registration, register
-from surfsig.shapes import fit_cylinder, fit_plane, fit_sphere
+from surfsig.shapes import (
+    FormError,
+    SurfaceAngle,
+    SurfaceDistance,
+    SurfacePatch,
+    fit_cylinder,
+    fit_plane,
+    fit_sphere,
+)
 from surfsig.signature_similarity import flip_signatures, similarity, similarity_class, similarity_matrix
-from surfsig.surfaces import PointClass, Surface, Surfaces, find_surfaces
+from surfsig.surfaces import (
+    PipeJoint,
+    PipeRun,
+    PipeSegment,
+    PointClass,
+    Surface,
+    Surfaces,
+    find_surfaces,
+)
 from surfsig.units import unit_mismatch
 
 __all__ = [
@@ -69,6 +85,7 @@ __all__ = [
     "FileFormatError",
     "FindSettings",
     "FitUsed",
+    "FormError",
     "Frame",
     "FreeDirection",
     "GeoKeys",
@@ -80,6 +97,9 @@ __all__ = [
     "Odometry",
     "OdometrySettings",
     "Piece",
+    "PipeJoint",
+    "PipeRun",
+    "PipeSegment",
     "PointClass",
     "PointCloud",
     "Recurrence",
@@ -90,6 +110,9 @@ __all__ = [
     "ScanStatus",
     "Status",
     "Surface",
+    "SurfaceAngle",
+    "SurfaceDistance",
+    "SurfacePatch",
     "Surfaces",
     "SurfsigError",
     "TimedScan",

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.colors import symmetric_limit
 from surfsig.convert.libraries import library
 from surfsig.files.atomic import replacing
 
@@ -63,6 +64,9 @@ class Group:
     """Lines that a pointer on it shows."""
     state: str | None = None
     """The state in which it is shown; None for all."""
+    values: Array | None = None
+    """(n,): a number for each point, which gives it its colour in place of the group's, on a diverging scale
+    that is symmetric about 0."""
 
 
 def write_page(
@@ -112,11 +116,12 @@ def _figure(groups: Sequence[Group]) -> Any:
     states = _states(groups)
     drawn = [_drawn(groups, state) for state in [*states, None]]
     step = max(1, math.ceil(max(drawn) / DRAWN))
-    parts = [group.points[np.isfinite(group.points).all(axis=1)][::step] for group in groups]
+    chosen = [np.flatnonzero(np.isfinite(group.points).all(axis=1))[::step] for group in groups]
+    parts = [group.points[some] for group, some in zip(groups, chosen, strict=True)]
     origin = _origin(np.concatenate([np.empty((0, 3)), *parts]))
     traces = [
-        _trace(go, (places - origin).astype(np.float32), group, states)
-        for group, places in zip(groups, parts, strict=True)
+        _trace(go, (places - origin).astype(np.float32), group, some, states)
+        for group, places, some in zip(groups, parts, chosen, strict=True)
     ]
     titles = [f"{letter} - {at:.15g}" if at else letter for letter, at in zip("xyz", origin, strict=True)]
     axes = {f"{letter}axis": {"title": {"text": text}} for letter, text in zip("xyz", titles, strict=True)}
@@ -166,10 +171,18 @@ def _origin(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return origin
 
 
-def _trace(go: Any, places: NDArray[np.float32], group: Group, states: Sequence[str]) -> Any:
+def _trace(
+    go: Any, places: NDArray[np.float32], group: Group, some: NDArray[np.intp], states: Sequence[str]
+) -> Any:
     where = dict(zip("xyz", places.T, strict=True))
-    marker = {"size": 1.6, "color": _css(group.color)}
-    hover = "<br>".join([f"<b>{group.name}</b>", *group.words]) + "<extra></extra>"
+    marker: dict[str, Any] = {"size": 1.6, "color": _css(group.color)}
+    words = [f"<b>{group.name}</b>", *group.words]
+    if group.values is not None:
+        end = symmetric_limit(group.values)
+        marker |= {"color": group.values[some].astype(np.float32), "cmin": -end, "cmax": end}
+        marker |= {"colorscale": "RdBu", "reversescale": True, "colorbar": {"title": {"text": group.name}}}
+        words.append("%{marker.color:.3g}")
+    hover = "<br>".join(words) + "<extra></extra>"
     return go.Scatter3d(
         **where,
         mode="markers",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surfsig.colors import symmetric_limit
 from surfsig.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -91,8 +92,7 @@ def draw_points(
         raise InvalidInputError(f"{xyz.shape[0]} points have {value.shape} values")
     axes = np.eye(3) if view is None else np.asarray(view, np.float64)
     if limits is None:
-        known = np.abs(value[np.isfinite(value)])
-        end = float(np.quantile(known, 0.95)) if len(known) else 1.0
+        end = symmetric_limit(value)
         limits = (-end, end)
     mapping = ScalarMappable(Normalize(*limits), colormap)
     colors = mapping.to_rgba(value)[:, :3]

@@ -65,6 +65,7 @@ def test_a_labelled_file(shell: Shell, scan: Path, tmp_path: Path, ending: str) 
     np.testing.assert_array_equal(labelled.fields["surface"], found.labels)
     np.testing.assert_array_equal(labelled.fields["point_class"], found.classes)
     np.testing.assert_array_equal(labelled.fields["confidence"], found.confidence)
+    np.testing.assert_array_equal(labelled.fields["deviation"], found.deviations().astype(np.float32))
     kinds = labelled.fields["surface_kind"]
     assert set(np.unique(kinds[found.labels == 2])) == {PointClass.SPHERE}
     if ending in ("ply", "pcd"):

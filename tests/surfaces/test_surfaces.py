@@ -183,7 +183,7 @@ def test_a_scan_at_utm_coordinates(scene: surface_scenes.Known, found: Surfaces)
 
 def test_fields_for_files_and_tables(found: Surfaces) -> None:
     columns = found.columns()
-    assert list(columns) == ["surface", "surface_kind", "point_class", "confidence"]
+    assert list(columns) == ["surface", "surface_kind", "point_class", "confidence", "deviation"]
     np.testing.assert_array_equal(columns["surface"], found.labels)
     np.testing.assert_array_equal(columns["surface_kind"] > 0, found.labels >= 0)
     colors = np.unique(found.colors, axis=0)

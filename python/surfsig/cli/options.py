@@ -169,7 +169,9 @@ def result_options(values: str, page: str) -> Callable[[Function], Function]:
     return added
 
 
-def check_results(output: Path | None, json_file: Path | None, report: Path | None) -> bool:
+def check_results(
+    output: Path | None, json_file: Path | None, report: Path | None, *others: Path | None
+) -> bool:
     """Refuse what cannot be written before there is work; tell whether JSON goes to stdout."""
     from surfsig.files import check_writable
     from surfsig.files.atomic import check_target
@@ -177,7 +179,7 @@ def check_results(output: Path | None, json_file: Path | None, report: Path | No
     on_stdout = json_file is not None and str(json_file) == "-"
     if output is not None:
         check_writable(output)
-    for target in (report, None if on_stdout else json_file):
+    for target in (report, None if on_stdout else json_file, *others):
         if target is not None:
             check_target(target)
     return on_stdout

@@ -44,6 +44,14 @@ if TYPE_CHECKING:
     metavar="KIND,...",
     help="Which to look for: plane, sphere, cylinder, cone, torus.  [default: all]",
 )
+@click.option(
+    "--export",
+    type=CLOUD,
+    metavar="FILE",
+    help="Write the bounded surfaces as meshes: a .glb, .obj or .dxf file.",
+)
+@click.option("--csv", "csv_file", type=CLOUD, metavar="FILE.csv", help="Write the table of surfaces as CSV.")
+@click.option("--excel", type=CLOUD, metavar="FILE.xlsx", help="Write the table of surfaces for Excel.")
 @click.option("--recurrences", is_flag=True, help="Say which objects and surfaces occur more than once, too.")
 @input_options
 @threads_option
@@ -56,6 +64,9 @@ def surfaces_command(
     min_points: int | None,
     noise: float | None,
     kinds: list[str] | None,
+    export: Path | None,
+    csv_file: Path | None,
+    excel: Path | None,
     recurrences: bool,
     threads: int | None,
     quiet: bool,
@@ -65,21 +76,31 @@ def surfaces_command(
 
     Nothing needs to be set. The output has the input's points and fields, and surface (its number, -1 for
     none), surface_kind and point_class (1 plane, 2 cylinder, 3 sphere, 4 cone, 5 torus, 6 saddle, 7 edge,
-    8 free form, 0 unknown), confidence (0 to 1), and red, green, blue by surface. With --recurrences it has
-    piece and recurrence, the numbers of what hangs together and of the group of pieces that show the same
-    object (-1 for none), and JSON has their poses.
+    8 free form, 0 unknown), confidence (0 to 1), deviation (signed distance from its surface), and red,
+    green, blue by surface. With --recurrences it has piece and recurrence, the numbers of what hangs
+    together and of the group of pieces that show the same object (-1 for none), and JSON has their poses.
+    Pipes that are joined end to end, by elbows or where their axes meet, are rows of the table and
+    pipe_runs of JSON.
 
     \b
     Examples:
       surfsig surfaces scan.pcd
       surfsig surfaces scan.pcd --recurrences
       surfsig surfaces scan.pcd -o labelled.ply --report report.html
+      surfsig surfaces scan.pcd --export model.glb --csv table.csv
       surfsig surfaces part.ply --unit mm --kinds plane,cylinder --json - | jq '.surfaces[].radius'
     """  # noqa: D301
     import surfsig
     from surfsig.missing_returns import warn_of_missing_returns
+    from surfsig.surfaces.export import check_export
+    from surfsig.surfaces.table import excel_library
+    from surfsig.surfaces.wording import run_rows
 
-    on_stdout = check_results(output, json_file, report)
+    on_stdout = check_results(output, json_file, report, export, csv_file, excel)
+    if export is not None:
+        check_export(export)
+    if excel is not None:
+        excel_library()
     shown = on_terminal() and not quiet
     with progress_bar("reading", "bytes", shown=shown) as progress:
         cloud = surfsig.read(file, progress=progress, **reading)
@@ -107,14 +128,22 @@ def surfaces_command(
             surfsig.write(output, cloud, columns, progress=progress)
     if report is not None:
         found.write_report(report, title=f"Surfaces of {file.name}")
+    if csv_file is not None:
+        found.write_csv(csv_file)
+    if excel is not None:
+        found.write_excel(excel)
     if on_stdout:
         print_json(_values(file, found, recurring))
     elif json_file is not None:
         write_json(json_file, _values(file, found, recurring))
     if len(found) and not on_stdout and not quiet:
-        print_columns(f"{file}: {found.summary()}", *found.table())
+        header, rows = found.table()
+        print_columns(f"{file}: {found.summary()}", header, [*rows, *run_rows(found.pipe_runs())])
     if recurring is not None and not on_stdout and not quiet:
         print_columns(f"{file}: {recurring.summary()}", *recurring.table())
+    # The last, for where no surface was found there is none to write, which is an error.
+    if export is not None:
+        found.export(export)
 
 
 def _values(file: Path, found: Surfaces, recurring: Recurrences | None) -> dict[str, Any]:
@@ -130,5 +159,6 @@ def _values(file: Path, found: Surfaces, recurring: Recurrences | None) -> dict[
         "points": len(found.cloud),
         "classes": {kind.name.lower(): counts[kind] for kind in PointClass},
         "surfaces": [{"number": number, **surface.to_dict()} for number, surface in enumerate(found)],
+        "pipe_runs": [run.to_dict() for run in found.pipe_runs()],
     }
     return values if recurring is None else values | {"recurrences": recurring.values()}

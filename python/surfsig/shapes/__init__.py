@@ -13,13 +13,27 @@ from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud, position_array
 from surfsig.progress import ProgressCallback
 from surfsig.resolution import warn_if_surface_is_lost
+from surfsig.shapes.form_error import FormError
 from surfsig.shapes.growth import grown
+from surfsig.shapes.patch import SurfacePatch
+from surfsig.shapes.relation import SurfaceAngle, SurfaceDistance
 from surfsig.shapes.robust import fitted_to_inliers
 from surfsig.shapes.surface import KINDS, Kind, Surface, measured_surface
 
 Array = NDArray[np.float64]
 
-__all__ = ["KINDS", "Kind", "Surface", "fit_cylinder", "fit_plane", "fit_sphere"]
+__all__ = [
+    "KINDS",
+    "FormError",
+    "Kind",
+    "Surface",
+    "SurfaceAngle",
+    "SurfaceDistance",
+    "SurfacePatch",
+    "fit_cylinder",
+    "fit_plane",
+    "fit_sphere",
+]
 
 
 def fit_sphere(

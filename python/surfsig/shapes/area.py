@@ -33,12 +33,8 @@ def covered_area(placement: Placement, points: Array) -> float:
     -------
     The area of the cells with points, of those at the border one half: so much of them is covered on average.
     """
-    from scipy.spatial import KDTree
-
     flat = unrolled(placement, points[:: math.ceil(len(points) / _POINTS)])
-    some = flat[:: math.ceil(len(flat) / 1000)]
-    reach, _ = KDTree(flat).query(some, [min(_NEIGHBOURS, max(4, len(flat) // 8))])
-    side = float(np.median(reach))
+    side = cell_width(flat)
     # Cells have whole numbers, and points that are nearly all at one position tell no width of cells.
     if not side > _FINEST * float(np.ptp(flat, axis=0).max()):
         return math.nan
@@ -50,6 +46,22 @@ def covered_area(placement: Placement, points: Array) -> float:
     for step in (-1, 1, -rows, rows):
         inner &= np.isin(numbers + step, numbers)
     return side**2 * float(inner.sum() + 0.5 * (~inner).sum())
+
+
+def cell_width(flat: Array) -> float:
+    """Choose how wide cells are on a map, so that hardly any is empty by chance.
+
+    Parameters
+    ----------
+    flat
+        (n, 2), the points' places on the map.
+    """
+    from scipy.spatial import KDTree
+
+    flat = flat[:: math.ceil(len(flat) / _POINTS)]
+    some = flat[:: math.ceil(len(flat) / 1000)]
+    reach, _ = KDTree(flat).query(some, [min(_NEIGHBOURS, max(4, len(flat) // 8))])
+    return float(np.median(reach))
 
 
 def unrolled(placement: Placement, points: Array) -> Array:

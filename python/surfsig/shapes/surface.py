@@ -15,7 +15,10 @@ from surfsig.defaults import INTERVAL
 from surfsig.digits import with_error
 from surfsig.point_cloud import PointCloud
 from surfsig.shapes.area import covered_area
+from surfsig.shapes.form_error import FormError, form_error
 from surfsig.shapes.geometry import Array, Placement, covered_arc, in_plane
+from surfsig.shapes.patch import SurfacePatch, patch_of
+from surfsig.shapes.relation import SurfaceAngle, SurfaceDistance, angle_between, distance_between
 
 Kind = Literal["plane", "sphere", "cylinder", "cone", "torus"]
 """What a surface is."""
@@ -163,6 +166,100 @@ class Surface:
         local = cloud.offsets.astype(np.float64) + (cloud.origin - self.point)
         with np.errstate(invalid="ignore"):
             return self._placement.distances(local)
+
+    def distance_to(self, other: Surface, cloud: PointCloud | ArrayLike | None = None) -> SurfaceDistance:
+        """Measure how far another surface is, with the standard error that both covariances give.
+
+        Two planes, or a plane and the axis of a cylinder or cone, must be parallel within 5 degrees. The gap
+        of planes is taken along the mean of their normals, in the middle between their centers, or, with the
+        cloud, at the centroid of the part that lies opposite: there it is the mean gap. A plane and a
+        cylinder are measured in the middle of the cylinder's axis. Axes that are parallel within 5 degrees
+        are measured across, in the middle between their centers (how far they are from coaxial); others where
+        they are nearest. A torus counts with its center against a plane, else with its axis; a sphere with
+        its center.
+
+        Parameters
+        ----------
+        other
+            The other surface, in the same coordinates. Its errors are taken as independent of these.
+        cloud
+            What both surfaces were fitted to; of two planes it gives the mean gap and the parallelism.
+
+        Returns
+        -------
+        SurfaceDistance
+            In the points' unit.
+
+        Raises
+        ------
+        InvalidInputError
+            If planes, or a plane and an axis, are not parallel; or if the cloud is not the surfaces' own.
+        """
+        return distance_between(self, other, None if cloud is None else PointCloud.of(cloud))
+
+    def angle_to(self, other: Surface) -> SurfaceAngle:
+        """Measure the angle to another surface and where both meet, with standard errors.
+
+        Parameters
+        ----------
+        other
+            The other surface, in the same coordinates. Its errors are taken as independent of these.
+
+        Returns
+        -------
+        SurfaceAngle
+            Between two planes, a plane and an axis, or two axes, in radians from 0 to pi/2.
+
+        Raises
+        ------
+        InvalidInputError
+            If one is a sphere, which has no direction.
+        """
+        return angle_between(self, other)
+
+    def form_error(self, cloud: PointCloud | ArrayLike) -> FormError:
+        """Measure how far the members are from the surface: a plane's flatness, a cylinder's cylindricity.
+
+        Parameters
+        ----------
+        cloud
+            What the surface was fitted to.
+
+        Returns
+        -------
+        FormError
+            In the points' unit.
+
+        Raises
+        ------
+        InvalidInputError
+            If the cloud has fewer points than the surface was fitted to.
+        """
+        return form_error(self, PointCloud.of(cloud))
+
+    def patch(self, cloud: PointCloud | ArrayLike) -> SurfacePatch:
+        """Make a mesh of the part of the surface that its members cover.
+
+        On a map of the surface, cells are joined where they have points. They are as wide as it is far to 32
+        neighbours, or up to four times that where points are in rows or clusters; holes and outlines are as
+        fine as these cells.
+
+        Parameters
+        ----------
+        cloud
+            What the surface was fitted to.
+
+        Returns
+        -------
+        SurfacePatch
+            Vertices, all on the surface, and triangles.
+
+        Raises
+        ------
+        InvalidInputError
+            If the cloud has fewer points than the surface was fitted to.
+        """
+        return patch_of(self, PointCloud.of(cloud))
 
     def to_dict(self) -> dict[str, Any]:
         """Name all values, as JSON and tables call them, without those that the kind does not have.

@@ -60,24 +60,37 @@ def classify(
     cloud: PointCloud,
     labels: NDArray[np.int32],
     surfaces: Sequence[Surface],
+    deviations: NDArray[np.float64],
     *,
     noise: float | None,
     threads: int | None,
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-    """Give each point's `PointClass` as a number and its confidence; see `Surfaces.confidence`."""
+    """Give each point's `PointClass` as a number and its confidence; see `Surfaces.confidence`.
+
+    The deviations are those of `deviations_of`.
+    """
     classes = np.zeros(len(cloud), np.uint8)
     confidence = np.zeros(len(cloud), np.float32)
     rest = np.flatnonzero((labels < 0) & cloud.finite)
     around = extract(cloud, neighbors=NEIGHBORS, at=rest, threads=threads)
     for members, surface in zip(members_of(labels, len(surfaces)), surfaces, strict=True):
         classes[members] = PointClass[surface.kind.upper()]
-        distances = surface.distances(cloud.offsets[members] + cloud.origin)
         spacing = np.sqrt(surface.area / surface.count)
-        confidence[members] = _belonging(distances, max(surface.deviation, FLOOR * spacing)) * _evidence(
-            surface
-        )
+        confidence[members] = _belonging(
+            deviations[members], max(surface.deviation, FLOOR * spacing)
+        ) * _evidence(surface)
     classes[rest], confidence[rest] = _without_surface(around, _typical_noise(around, surfaces, noise))
     return classes, confidence
+
+
+def deviations_of(
+    cloud: PointCloud, labels: NDArray[np.int32], surfaces: Sequence[Surface]
+) -> NDArray[np.float64]:
+    """Give each point's signed distance from its own surface, (n,); NaN where it has none."""
+    deviations = np.full(len(cloud), np.nan)
+    for members, surface in zip(members_of(labels, len(surfaces)), surfaces, strict=True):
+        deviations[members] = surface.distances(cloud.offsets[members] + cloud.origin)
+    return deviations
 
 
 def members_of(labels: NDArray[np.int32], count: int) -> list[NDArray[np.intp]]:

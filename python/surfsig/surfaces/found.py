@@ -16,7 +16,10 @@ from surfsig import _surfsig
 from surfsig.colors import GREY, distinct_colors
 from surfsig.point_cloud import PointCloud
 from surfsig.shapes.surface import Surface
-from surfsig.surfaces.classes import PointClass, classify
+from surfsig.surfaces.classes import PointClass, classify, deviations_of
+from surfsig.surfaces.export import export
+from surfsig.surfaces.pipe_runs import PipeRun, find_pipe_runs
+from surfsig.surfaces.table import table_columns, write_csv, write_excel
 from surfsig.surfaces.wording import HEADER, table_rows
 
 if TYPE_CHECKING:
@@ -53,7 +56,18 @@ class Surfaces:
 
     @cached_property
     def _classified(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        return classify(self.cloud, self.labels, self.surfaces, noise=self.noise, threads=self.threads)
+        return classify(
+            self.cloud,
+            self.labels,
+            self.surfaces,
+            self._deviations,
+            noise=self.noise,
+            threads=self.threads,
+        )
+
+    @cached_property
+    def _deviations(self) -> NDArray[np.float64]:
+        return deviations_of(self.cloud, self.labels, self.surfaces)
 
     @property
     def classes(self) -> NDArray[np.uint8]:
@@ -76,6 +90,17 @@ class Surfaces:
         saddle, the probability that both curvatures have their sign; of a free form, what that lacks to 1.
         """
         return self._classified[1]
+
+    def deviations(self) -> NDArray[np.float64]:
+        """Give how far each point is from its own surface: a scalar field of the scan.
+
+        Returns
+        -------
+        numpy.ndarray
+            Signed distances (n,), in the scan's unit: positive outside, or where a plane's normal points; NaN
+            for points of no surface.
+        """
+        return self._deviations.copy()
 
     def summary(self) -> str:
         """Say in words how many surfaces of each kind there are.
@@ -114,7 +139,7 @@ class Surfaces:
         Returns
         -------
         (n,) arrays: surface (its number, -1 for none), surface_kind (its kind as a `PointClass`, 0 for none),
-        point_class, confidence.
+        point_class, confidence, deviation (signed distance from its surface, NaN for none).
         """
         in_surface = self.labels >= 0
         return {
@@ -122,6 +147,7 @@ class Surfaces:
             "surface_kind": np.where(in_surface, self.classes, PointClass.UNKNOWN).astype(np.uint8),
             "point_class": self.classes,
             "confidence": self.confidence,
+            "deviation": self._deviations.astype(np.float32),
         }
 
     def to_pandas(self) -> pd.DataFrame:
@@ -141,21 +167,88 @@ class Surfaces:
         from surfsig.convert.libraries import library
 
         pandas = library("pandas", "pandas", "pandas")
-        columns: dict[str, Any] = {"kind": [surface.kind for surface in self]}
-        columns |= {name: self._numbers(name) for name in ("radius", "radius_std")}
-        intervals = np.array([surface.interval for surface in self]).reshape(-1, 2)
-        columns |= dict(zip(("radius_low", "radius_high"), intervals.T, strict=True))
-        columns |= {name: self._numbers(name) for name in ("major_radius", "half_angle")}
-        for name in ("center", "axis"):
-            vectors = self._numbers(name).reshape(-1, 3)
-            columns |= {f"{name}_{letter}": vectors[:, i] for i, letter in enumerate("xyz")}
-        columns |= {name: self._numbers(name) for name in ("length", "width", "arc", "area", "count", "rms")}
-        return pandas.DataFrame(columns)
+        return pandas.DataFrame(table_columns(self.surfaces))
+
+    def write_csv(self, path: str | Path) -> None:
+        """Write the table of `to_pandas` as text with commas, the surfaces' numbers first.
+
+        A value that a kind does not have is left empty. The file is whole or as it was before.
+
+        Parameters
+        ----------
+        path
+            Where to write.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
+        """
+        write_csv(self.surfaces, path)
+
+    def write_excel(self, path: str | Path) -> None:
+        """Write the table of `to_pandas` as an Excel workbook (.xlsx), the surfaces' numbers first.
+
+        Needs XlsxWriter (`pip install surfsig[excel]`). A value that a kind does not have is an empty cell.
+        The file is whole or as it was before.
+
+        Parameters
+        ----------
+        path
+            Where to write.
+
+        Raises
+        ------
+        InvalidInputError
+            If XlsxWriter is not installed.
+        OSError
+            If it cannot be written.
+        """
+        write_excel(self.surfaces, path)
+
+    def pipe_runs(self) -> list[PipeRun]:
+        """Join the pipes: cylinders of equal radius, end to end.
+
+        Two ends are joined by a torus of the same radius whose circle touches both axes (an elbow), where
+        the axes meet near both ends (a corner: an elbow that is hidden or too short to be found), or where
+        two pieces lie in line. Radii are equal if they differ insignificantly (99 %) or by less than 3 %.
+        Near is within four diameters, which is farther than most elbows and flanges reach; a pipe that goes
+        on past the joint, as at a tee, is not joined there.
+
+        Returns
+        -------
+        list of PipeRun
+            Runs of two segments or more, the longest first; lengths in the scan's unit.
+        """
+        return find_pipe_runs(self.surfaces)
+
+    def export(self, path: str | Path) -> None:
+        """Write the bounded surfaces as meshes: GLB, OBJ or DXF, by the path's ending.
+
+        Each surface is an object of its own colour and named by number and kind ("3 cylinder"); in DXF a
+        polyface mesh on a layer of that name. Coordinates are the scan's, in its unit, and not turned: where
+        a program expects y upwards (as glTF says) or metres, it must be told. Needs trimesh, or of DXF ezdxf
+        (`pip install surfsig[export]`). The file is whole or as it was before.
+
+        Parameters
+        ----------
+        path
+            Where to write; ends in .glb, .obj or .dxf.
+
+        Raises
+        ------
+        InvalidInputError
+            If the ending is another one, the library is not installed, or there is no surface.
+        OSError
+            If it cannot be written.
+        """
+        export(self, path)
 
     def write_report(self, path: str | Path, *, title: str = "Surfaces") -> None:
         """Write one HTML page: the points coloured by surface, in a view that turns, and a table with errors.
 
-        The page needs no network. Of many points 60,000 are drawn.
+        A button colours them by their distance from the surface, on a scale that is symmetric about 0 and as
+        wide as 95 % of the distances. The page needs no network. Of many points 60,000 are drawn.
 
         Parameters
         ----------
@@ -182,9 +275,6 @@ class Surfaces:
         if finite < _surfsig.FEWEST_SURFACE_POINTS:
             return f"{finite:,} points are too few"
         return f"of {finite:,} points too few lie on any one surface, within the noise around them"
-
-    def _numbers(self, name: str) -> NDArray[Any]:
-        return np.array([getattr(surface, name) for surface in self])
 
 
 def _plural(word: str, count: int) -> str:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 from surfsig.colors import GREY, distinct_colors
 from surfsig.page import Group, write_page
+from surfsig.surfaces.wording import run_rows
 
 if TYPE_CHECKING:
     from surfsig.surfaces.found import Surfaces
 
 
 def write_report(found: Surfaces, path: str | Path, title: str) -> None:
-    """Write the points coloured by surface, and the table of the surfaces.
+    """Write the points coloured by surface or by their distance from it, and the table of the surfaces.
 
     Parameters
     ----------
@@ -38,11 +39,23 @@ def write_report(found: Surfaces, path: str | Path, title: str) -> None:
             color,
             number,
             [f"{what}: {value}" for what, value in zip(header[2:], row[2:], strict=True) if value],
+            state="surfaces",
         )
         for number, (row, color) in enumerate(zip(rows, distinct_colors(len(found)).tolist(), strict=True))
     ]
     groups.append(Group("no surface", points[labels < 0], GREY))
+    if len(found):
+        inside = labels >= 0
+        deviations = Group(
+            "distance from the surface",
+            points[inside],
+            GREY,
+            state="deviations",
+            values=found.deviations()[inside],
+        )
+        # A page begins with its last state.
+        groups.insert(0, deviations)
     text = (
         f"{found.summary()}. Lengths are in the scan's unit; a click on a point or a row shows the surface."
     )
-    write_page(path, title, text, groups, header, rows)
+    write_page(path, title, text, groups, header, [*rows, *run_rows(found.pipe_runs())])

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable
 
-from surfsig.digits import decimals_of
+from surfsig.digits import decimals_of, with_error
 from surfsig.shapes.surface import Surface
+from surfsig.surfaces.pipe_runs import PipeRun
 
 HEADER = ("", "kind", "radius", "95 % interval", "size", "area", "points", "rms")
+
+_JOINTS = {"elbow": "elbows", "corner": "corners", "straight": "straight joints"}
 
 
 def table_rows(surfaces: Iterable[Surface]) -> list[tuple[str, ...]]:
@@ -25,6 +29,20 @@ def table_rows(surfaces: Iterable[Surface]) -> list[tuple[str, ...]]:
         )
         for number, surface in enumerate(surfaces)
     ]
+
+
+def run_rows(runs: Iterable[PipeRun]) -> list[tuple[str, ...]]:
+    """Describe each run of pipes in as many words as `HEADER` has."""
+    rows: list[tuple[str, ...]] = []
+    for run in runs:
+        path = "-".join(str(segment.surface) for segment in run.segments)
+        length = with_error(run.length, run.length_std)
+        kinds = Counter(joint.kind for joint in run.joints)
+        joints = ", ".join(
+            f"{count} {kind if count == 1 else _JOINTS[kind]}" for kind, count in kinds.items()
+        )
+        rows.append(("", f"pipe {path}", f"{run.radius:.5g}", "", f"{length} long, {joints}", "", "", ""))
+    return rows
 
 
 def _radius(surface: Surface) -> tuple[str, str]:
