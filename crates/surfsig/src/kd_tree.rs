@@ -143,7 +143,20 @@ impl<const N: usize> KdTree<N> {
     /// assert_eq!(found, [(0.0, 1), (4.0, 0)]);
     /// ```
     pub fn nearest_k(&self, point: [f64; N], count: usize, found: &mut Vec<(f64, u32)>) {
+        self.nearest_k_within(point, count, f64::INFINITY, found);
+    }
+
+    /// The same among those within a distance.
+    ///
+    /// ```
+    /// let tree = surfsig::KdTree::new(&[[0.0; 3], [2.0, 0.0, 0.0]]);
+    /// let mut found = Vec::new();
+    /// tree.nearest_k_within([2.0, 0.0, 0.0], 5, 1.0, &mut found);
+    /// assert_eq!(found, [(0.0, 1)]);
+    /// ```
+    pub fn nearest_k_within(&self, point: [f64; N], count: usize, reach: f64, found: &mut Vec<(f64, u32)>) {
         found.clear();
+        let farthest = reach * reach;
         if count == 0 {
             return;
         }
@@ -162,9 +175,9 @@ impl<const N: usize> KdTree<N> {
                     let position = found.iter().rposition(|other| *other < entry).map_or(0, |last| last + 1);
                     found.insert(position, entry);
                 }
-                if found.len() == count { found[count - 1].0 } else { f64::INFINITY }
+                if found.len() == count { found[count - 1].0 } else { farthest }
             },
-            &mut { f64::INFINITY },
+            &mut { farthest },
         );
     }
 
@@ -297,7 +310,10 @@ mod tests {
                 inside.sort_unstable();
                 let mut found = Vec::new();
                 tree.within(at, reach, &mut found);
-                prop_assert_eq!(found, inside);
+                prop_assert_eq!(&found, &inside);
+                let mut nearest = Vec::new();
+                tree.nearest_k_within(at, 7, reach, &mut nearest);
+                prop_assert_eq!(&nearest, &expected[..inside.len().min(7)]);
             }
             let mut found = Vec::new();
             for count in [0, 1, 7, 400] {

@@ -106,7 +106,7 @@ pub use orientation::consistent_directions;
 pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
 pub use recurrences::{
-    OrientedScan, PieceAlignment, PieceSituation, PieceView, RecurrenceSettings, PosesOfPair, align_pieces,
+    OrientedScan, PieceAlignment, PieceSituation, PieceView, PosesOfPair, RecurrenceSettings, align_pieces,
     judge_poses, refine_poses,
 };
 pub use registration::{REGISTRATION_STEPS, Registration, RegistrationSettings, register};

@@ -6,7 +6,7 @@ use crate::geometry::RigidTransform;
 use nalgebra::{Matrix3, Vector3};
 
 /// Points of a piece that are judged before it is asked whether the pose can still be good enough.
-const BLOCK: usize = 16;
+const BLOCK: usize = 8;
 
 /// By what poses are judged in a stage of the search.
 #[derive(Debug, Clone, Copy)]
@@ -163,4 +163,65 @@ fn spread(normals: &[[f32; 3]]) -> f64 {
     let vectors = normals.iter().map(|normal| Vector3::from(normal.map(f64::from)));
     let moments = vectors.map(|v| v * v.transpose()).sum::<Matrix3<f64>>() / normals.len().max(1) as f64;
     1.0 - moments.symmetric_eigenvalues().max()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{FLAT, SHEET, sheet};
+    use super::*;
+    use crate::random::Generator;
+
+    #[test]
+    fn giving_up_early_keeps_the_poses_that_are_best_by_all_points() {
+        let (source, target) =
+            (sheet(SHEET, &RigidTransform::identity()), sheet(FLAT, &RigidTransform::identity()));
+        let settings = RecurrenceSettings::default();
+        let mut random = Generator::new(&[5]);
+        let mut pose = || {
+            let [vector, offset] = [0.1, 2.0].map(|scale| [0; 3].map(|_| scale * random.normal()));
+            RigidTransform::from_rotation_vector(vector, offset)
+        };
+        let mut poses: Vec<RigidTransform> = (0..300).map(|_| pose()).collect();
+        // Of equal poses the first are kept.
+        poses.extend_from_within(..50);
+        let pair = PiecePair { source: &source, target: &target, settings: &settings };
+        for stage in [Stage::of_proposals(&settings), Stage::coarse(&settings), Stage::fine(&settings)] {
+            let agreement = |pose: &RigidTransform| {
+                let side = |moving: &PieceView, fixed: &PieceView, pose: &RigidTransform| {
+                    let points = &moving.points[..stage.points.min(moving.points.len())];
+                    let tolerance = stage.tolerance as f32 * fixed.tolerance;
+                    let mut sum = 0.0;
+                    for point in points {
+                        let found = fixed.image.judge(pose, &[*point], tolerance);
+                        let wrong = stage.weights[0] * f64::from(found.contradicted)
+                            + stage.weights[1] * f64::from(found.missing)
+                            + f64::from(found.mismatched);
+                        sum += f64::from(found.confirmed) - wrong;
+                    }
+                    sum / points.len() as f64
+                };
+                0.5 * (side(&source, &target, pose) + side(&target, &source, &pose.inverse()))
+            };
+            let mut slow: Vec<(RigidTransform, f64)> =
+                poses.iter().map(|pose| (*pose, agreement(pose))).collect();
+            slow.sort_by(|a, b| b.1.total_cmp(&a.1));
+            for count in [1, 12, 400] {
+                let found = pair.best(&poses, count, &stage);
+                assert_eq!(found.len(), count.min(poses.len()));
+                for (found, slow) in found.iter().zip(&slow) {
+                    assert_eq!(found.0, slow.0);
+                    assert!((found.1 - slow.1).abs() < 1e-12);
+                }
+            }
+            assert!(pair.best(&poses, 0, &stage).is_empty());
+        }
+    }
+
+    #[test]
+    fn the_spread_of_normals_is_that_of_their_directions() {
+        assert!(spread(&[[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]).abs() < 1e-12);
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        assert!((spread(&axes) - 2.0 / 3.0).abs() < 1e-12);
+        assert!((spread(&axes[..2]) - 0.5).abs() < 1e-12);
+    }
 }

@@ -84,12 +84,11 @@ pub(super) fn proposed_poses(
     let mut chosen: Vec<usize> = (0..source.pairs.len()).collect();
     let most = settings.proposals.div_ceil(settings.poses_per_pair.max(1));
     let chosen = random.shuffled(&mut chosen, most);
-    let farthest = settings.feature_tolerance * settings.feature_tolerance;
     let (mut poses, mut found) = (Vec::new(), Vec::new());
     for &ours in chosen.iter() {
-        target.tree.nearest_k(source.features[ours], settings.similar_pairs, &mut found);
-        let similar = found.iter().take_while(|(distance, _)| *distance < farthest).count();
-        for &mut (_, theirs) in random.shuffled(&mut found[..similar], settings.poses_per_pair) {
+        let (features, reach) = (source.features[ours], settings.feature_tolerance);
+        target.tree.nearest_k_within(features, settings.similar_pairs, reach, &mut found);
+        for &mut (_, theirs) in random.shuffled(&mut found, settings.poses_per_pair) {
             let theirs = theirs as usize;
             if source.sine(ours).min(target.sine(theirs)) > MIN_SINE {
                 poses.push(target.frame(theirs) * source.frame(ours).inverse());

@@ -68,6 +68,8 @@ fn vector(v: [f32; 3]) -> Vector3<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::RecurrenceSettings;
+    use super::super::tests::{FLAT, SHEET, apart, sheet};
     use super::*;
 
     #[test]
@@ -91,5 +93,27 @@ mod tests {
                 assert!((difference - expected).abs() < 1e-9, "{component}: {difference} {expected}");
             }
         }
+    }
+
+    #[test]
+    fn a_fit_brings_a_pose_to_the_truth_and_slides_no_plane() {
+        let settings = RecurrenceSettings::default();
+        let identity = RigidTransform::identity();
+        let near = RigidTransform::from_rotation_vector([0.01, -0.015, 0.01], [0.4, -0.3, 0.3]);
+        let bent = sheet(SHEET, &identity);
+        let pair = PiecePair { source: &bent, target: &bent, settings: &settings };
+        let [angle, distance] = apart(&pair.fitted(&near, usize::MAX), &identity);
+        // Points have no correspondence between those of the target: planes there are off by its curvature.
+        assert!(angle < 5e-3 && distance < 0.15, "{angle} {distance}");
+
+        let flat = sheet(FLAT, &identity);
+        let pair = PiecePair { source: &flat, target: &flat, settings: &settings };
+        let slid = RigidTransform::from_rotation_vector([0.0, 0.0, 0.02], [0.4, -0.3, 0.3]);
+        let wanted = RigidTransform::from_rotation_vector([0.0, 0.0, 0.02], [0.4, -0.3, 0.0]);
+        let [angle, distance] = apart(&pair.fitted(&slid, usize::MAX), &wanted);
+        assert!(angle < 1e-6 && distance < 1e-5, "{angle} {distance}");
+
+        let far = RigidTransform::from_rotation_vector([0.0; 3], [500.0, 0.0, 0.0]);
+        assert_eq!(pair.fitted(&far, usize::MAX), far);
     }
 }
