@@ -46,8 +46,8 @@ def find_recurrences(
     pieces are taken away. Two pieces match where they have signatures in common, and where there is a pose in
     which each is what the other's sensor saw: on its surface, or hidden, but not where the sensor saw
     through, nor where it would have seen something, nor beneath what it stands on. So a half hidden piece
-    matches a whole one. Shadows on the planes tell whether points had to be seen from a second place, as by
-    the camera of a triangulation scanner. The result is always the same.
+    matches a whole one. Shadows on the planes tell whether points had to be seen from a second viewpoint,
+    as by the camera of a triangulation scanner. The result is always the same.
 
     Parameters
     ----------
