@@ -64,7 +64,7 @@ RUST_FLOORS = (
     ("extract",),
     ("field", "primitive", "orientation"),
     ("surfaces", "alignment"),
-    ("registration", "finding", "odometry"),
+    ("registration", "finding", "odometry", "recurrences"),
 )
 """Modules of the core, the lowest floor first."""
 

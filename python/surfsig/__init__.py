@@ -18,6 +18,7 @@ from surfsig._surfsig import (
     FindSettings,
     Frame,
     OdometrySettings,
+    RecurrenceSettings,
     RegistrationSettings,
     __version__,
 )
@@ -103,6 +104,7 @@ __all__ = [
     "PointClass",
     "PointCloud",
     "Recurrence",
+    "RecurrenceSettings",
     "Recurrences",
     "Registration",
     "RegistrationSettings",

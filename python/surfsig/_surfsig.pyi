@@ -15,16 +15,17 @@ __all__ = [
     "OPTIMAL",
     "SCAN_STATUS_NAMES",
     "STATUS_NAMES",
-    "DepthImage",
     "E57Reader",
     "FindSettings",
     "Frame",
     "Odometry",
     "OdometrySettings",
+    "PieceView",
     "Primitive",
+    "RecurrenceSettings",
     "RegistrationSettings",
-    "SurfacePlaces",
     "__version__",
+    "align_pieces",
     "consistent_directions",
     "coordinate_steps",
     "extract",
@@ -35,11 +36,13 @@ __all__ = [
     "fit_primitive",
     "free_directions",
     "hidden_from",
+    "judge_poses",
     "match_fields",
     "mean_neighbor_distances",
     "measured_from_origin",
     "point_spacing",
     "prepare_model",
+    "refine_poses",
     "register",
     "voxel_representatives",
     "write_e57",
@@ -200,6 +203,169 @@ def register(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> dict[str, Any]: ...
+
+@final
+class RecurrenceSettings:
+    """How poses between pieces are searched and judged, for experts: what is not given keeps its default.
+
+    The crate's `RecurrenceSettings` says why each has its value.
+    """
+
+    def __new__(
+        cls,
+        *,
+        pair_voxels_per_extent: float | None = None,
+        spacings_per_voxel: float | None = None,
+        image_reach: float | None = None,
+        min_pair_distance: float | None = None,
+        similar_pairs: int | None = None,
+        poses_per_pair: int | None = None,
+        feature_tolerance: float | None = None,
+        proposals: int | None = None,
+        first_points: int | None = None,
+        first_tolerance: float | None = None,
+        tried: int | None = None,
+        coarse_points: int | None = None,
+        fine_points: int | None = None,
+        kept: int | None = None,
+        mutations: int | None = None,
+        rotation_deviation: float | None = None,
+        translation_deviation: float | None = None,
+        coarse_rounds: int | None = None,
+        fine_rounds: int | None = None,
+        min_coarse_score: float | None = None,
+        fit_steps: int | None = None,
+        unobservable_share: float | None = None,
+        coarse_weights: Sequence[float] | None = None,
+        fine_weights: Sequence[float] | None = None,
+        planar_weight: float | None = None,
+        round_spread: float | None = None,
+        seed: int | None = None,
+    ) -> RecurrenceSettings: ...
+    @property
+    def pair_voxels_per_extent(self) -> float:
+        """Voxels along a piece's extent, to which it is thinned before its points are paired."""
+    @property
+    def spacings_per_voxel(self) -> float:
+        """Point spacings along the voxels to which a piece is thinned before poses are judged by it."""
+    @property
+    def image_reach(self) -> float:
+        """How far around a piece its depth image reaches, in its extents from its mean."""
+    @property
+    def min_pair_distance(self) -> float:
+        """Distance between the points of a pair, at least, in the unit of length that counts as a radian."""
+    @property
+    def similar_pairs(self) -> int:
+        """Pairs of the target that are most similar to one of the source."""
+    @property
+    def poses_per_pair(self) -> int:
+        """Of these, how many propose a pose, chosen at random."""
+    @property
+    def feature_tolerance(self) -> float:
+        """Largest distance of the features of similar pairs, in radians, or units of length."""
+    @property
+    def proposals(self) -> int:
+        """Proposed poses, at most."""
+    @property
+    def first_points(self) -> int:
+        """Points of each piece by which proposals are judged."""
+    @property
+    def first_tolerance(self) -> float:
+        """Tolerances within which they are, in those of the later judgements."""
+    @property
+    def tried(self) -> int:
+        """Proposals that are judged by more points."""
+    @property
+    def coarse_points(self) -> int:
+        """Points of each piece in the coarse search."""
+    @property
+    def fine_points(self) -> int:
+        """Points of each piece in the fine search."""
+    @property
+    def kept(self) -> int:
+        """Poses that each round of the coarse search keeps."""
+    @property
+    def mutations(self) -> int:
+        """Random changes of each pose that is kept, in each round."""
+    @property
+    def rotation_deviation(self) -> float:
+        """Standard deviation of the rotation of the first random changes, in radians."""
+    @property
+    def translation_deviation(self) -> float:
+        """Standard deviation of their translation along each axis, in extents of the target."""
+    @property
+    def coarse_rounds(self) -> int:
+        """Rounds of the coarse search."""
+    @property
+    def fine_rounds(self) -> int:
+        """Rounds of the fine search."""
+    @property
+    def min_coarse_score(self) -> float:
+        """Score of the coarse search below which a pair of pieces is given up."""
+    @property
+    def fit_steps(self) -> int:
+        """Steps of a least squares fit."""
+    @property
+    def unobservable_share(self) -> float:
+        """Share of the largest eigenvalue below which a motion is not observable."""
+    @property
+    def coarse_weights(self) -> list[float]:
+        """What a contradicted and a missing point count in the coarse search, in confirmed ones."""
+    @property
+    def fine_weights(self) -> list[float]:
+        """The same in the fine search, and in the score."""
+    @property
+    def planar_weight(self) -> float:
+        """What a match counts whose confirmed points are on one plane."""
+    @property
+    def round_spread(self) -> float:
+        """Spread of the confirmed normals from which on a match counts fully."""
+    @property
+    def seed(self) -> int:
+        """Seed of the random choices."""
+    def __eq__(self, value: object, /) -> bool: ...
+
+@final
+class PieceView:
+    def __new__(
+        cls,
+        points: NDArray[np.float64],
+        normals: NDArray[np.float64],
+        piece: NDArray[np.int64],
+        *,
+        viewpoint: Sequence[float],
+        second_viewpoint: Sequence[float] | None = None,
+        support_planes: Sequence[tuple[Sequence[float], Sequence[float]]],
+        spacing: float,
+        tolerance: float,
+        pair_unit: float,
+        settings: RecurrenceSettings | None = None,
+    ) -> PieceView: ...
+    @property
+    def center(self) -> list[float]: ...
+
+def align_pieces(
+    views: Sequence[PieceView],
+    pairs: Sequence[tuple[int, int]],
+    *,
+    settings: RecurrenceSettings | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> list[tuple[NDArray[np.float64], float] | None]: ...
+def refine_poses(
+    views: Sequence[PieceView],
+    poses: Sequence[tuple[tuple[int, int], Sequence[NDArray[np.float64]]]],
+    *,
+    settings: RecurrenceSettings | None = None,
+    threads: int | None = None,
+) -> list[tuple[NDArray[np.float64], float] | None]: ...
+def judge_poses(
+    views: Sequence[PieceView],
+    poses: Sequence[tuple[tuple[int, int], NDArray[np.float64]]],
+    *,
+    settings: RecurrenceSettings | None = None,
+    threads: int | None = None,
+) -> list[float]: ...
 
 @final
 class FindSettings:
@@ -367,30 +533,6 @@ def write_e57(
     records: Sequence[tuple[str, str, int, int]],
     scans: Iterable[tuple[str, Sequence[float] | None, Iterable[Sequence[NDArray[Any]]]]],
 ) -> None: ...
-
-@final
-class SurfacePlaces:
-    def __new__(cls, places: NDArray[np.float32], normals: NDArray[np.float32]) -> SurfacePlaces: ...
-
-@final
-class DepthImage:
-    def __new__(
-        cls,
-        points: SurfacePlaces,
-        own: NDArray[np.bool_],
-        *,
-        viewpoint: Sequence[float],
-        spacing: float,
-        reach: float,
-        floors: SurfacePlaces,
-        second: Sequence[float] | None = None,
-    ) -> DepthImage: ...
-    def judge(
-        self, poses: NDArray[np.float64], places: SurfacePlaces, most: int, tolerance: float
-    ) -> NDArray[np.float32]: ...
-    def correspondences(
-        self, pose: NDArray[np.float64], places: SurfacePlaces, most: int, tolerance: float
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]: ...
 
 @final
 class E57Reader:

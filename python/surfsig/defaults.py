@@ -56,9 +56,6 @@ RECURRENCE_SCORE = 0.2
 RECURRENCE_CONFIDENCE = 0.99
 """Of the tests whether surfaces differ in size."""
 
-RECURRENCE_SEED = 0
-"""Of the searches for poses: the same pieces give the same result."""
-
 KEYPOINTS = 1000
 """Places that `surfsig.find_keypoints` chooses, where neither number nor distance is asked for."""
 

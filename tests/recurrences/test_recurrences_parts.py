@@ -12,12 +12,11 @@ from recurrences import adjusted_rand_index
 from surfsig.alignment.free_directions import free_directions, free_directions_of_surface
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences.equal_surfaces import equal_surfaces
-from surfsig.recurrences.grouping import groups_of, ways_from_first
+from surfsig.recurrences.grouping import best_match_tree, groups_of
 from surfsig.recurrences.main_surface import may_be_equal
-from surfsig.recurrences.matching import common_share
+from surfsig.recurrences.matching import common_shares
 from surfsig.recurrences.pieces import pieces_of
-from surfsig.recurrences.point_pairs import PointPairs, proposed_poses
-from surfsig.recurrences.shadows import Region, direction_of_sensor, places_without_points, second_place
+from surfsig.recurrences.shadows import Region, direction_of_sensor, places_without_points, second_viewpoint
 from surfsig.shapes.surface import PARAMETERS, Kind, measured_surface
 from surfsig.spacing import point_spacing
 from surfsig.surfaces import Surface, Surfaces
@@ -180,14 +179,22 @@ def test_groups_hang_together_by_matches_that_their_members_agree_with() -> None
 
 def test_poses_are_chained_over_the_best_matches() -> None:
     scores = np.array([[0, 0.2, 0.9], [0.2, 0, 0.8], [0.9, 0.8, 0]])
-    assert ways_from_first([0, 1, 2], scores) == [(0, 2), (2, 1)]
+    assert best_match_tree([0, 1, 2], scores) == [(0, 2), (2, 1)]
 
 
 def test_signatures_in_common_count_for_the_piece_that_has_fewer() -> None:
     rows = np.eye(243)[:4]
-    assert common_share(rows, rows[:2]) == 1.0
-    assert common_share(rows[:2], rows[1:3]) == 0.5
-    assert common_share(rows[:2], rows[2:]) == 0.0
+    # Their length does not count.
+    sets = [rows, 3.0 * rows[:2], rows[1:3], rows[2:], rows[:0]]
+    expected = [
+        [1.0, 1.0, 1.0, 1.0, 1.0],
+        [1.0, 1.0, 0.5, 0.0, 1.0],
+        [1.0, 0.5, 1.0, 0.5, 1.0],
+        [1.0, 0.0, 0.5, 1.0, 1.0],
+        [1.0, 1.0, 1.0, 1.0, 1.0],
+    ]
+    np.testing.assert_array_equal(common_shares(sets), expected)
+    assert common_shares([]).shape == (0, 0)
 
 
 def test_adjusted_rand_index() -> None:
@@ -245,23 +252,9 @@ def test_shadows_tell_where_the_sensor_was() -> None:
     assert direction_of_sensor([shadowed()], 1.0) is None
 
 
-def test_shadows_tell_a_second_place() -> None:
+def test_shadows_tell_a_second_viewpoint() -> None:
     eye, camera = 1e4 * unit(0.1, 0.0, 1.0), 1e4 * unit(0.0, -0.6, 1.0)
-    shift = second_place([shadowed(unit(*eye), unit(*camera))], [eye], 1.0)
+    shift = second_viewpoint([shadowed(unit(*eye), unit(*camera))], [eye], 1.0)
     assert shift is not None
     assert angle_between(eye + shift, camera) < 5.0
-    assert second_place([shadowed(unit(*eye))], [eye], 1.0) is None
-
-
-def test_pairs_along_a_normal_propose_no_pose() -> None:
-    """Of two parallel plates, points above each other leave the turn about the normal open."""
-    grid = np.stack(np.meshgrid(np.arange(4.0), np.arange(4.0)), axis=-1).reshape(-1, 2)
-    points = np.concatenate([np.column_stack([grid, np.full(16, height)]) for height in (0.0, 3.0)])
-    normals = np.repeat([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]], 16, axis=0)
-    pairs = PointPairs.of(points, normals, 1.0)
-    poses = proposed_poses(pairs, pairs, 4000, np.random.default_rng(1))
-    assert len(poses) > 100
-    rotations = poses[:, :3, :3]
-    np.testing.assert_allclose(
-        rotations @ rotations.swapaxes(1, 2), np.broadcast_to(np.eye(3), rotations.shape), atol=1e-12
-    )
+    assert second_viewpoint([shadowed(unit(*eye))], [eye], 1.0) is None

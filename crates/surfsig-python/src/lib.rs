@@ -1,6 +1,5 @@
 //! The bindings: release the interpreter, call the core, map the error; nothing else.
 
-mod depth_image;
 mod e57;
 mod extract;
 mod field;
@@ -10,6 +9,7 @@ mod neighbor_distances;
 mod odometry;
 mod primitive;
 mod python_file;
+mod recurrences;
 mod registration;
 mod settings;
 mod surfaces;
@@ -59,8 +59,6 @@ fn rows<'a, T: numpy::Element, const N: usize>(array: &'a PyReadonlyArray2<'_, T
 #[pymodule]
 mod _surfsig {
     #[pymodule_export]
-    use crate::depth_image::{DepthImage, SurfacePlaces};
-    #[pymodule_export]
     use crate::e57::{E57Reader, write_e57};
     #[pymodule_export]
     use crate::extract::{coordinate_steps, extract, voxel_representatives};
@@ -76,6 +74,8 @@ mod _surfsig {
     use crate::odometry::{Odometry, OdometrySettings};
     #[pymodule_export]
     use crate::primitive::{Primitive, fit_primitive};
+    #[pymodule_export]
+    use crate::recurrences::{PieceView, RecurrenceSettings, align_pieces, judge_poses, refine_poses};
     #[pymodule_export]
     use crate::registration::{RegistrationSettings, consistent_directions, free_directions, register};
     #[pymodule_export]

@@ -12,7 +12,7 @@ const LOST: i32 = 6;
 /// Cosine between normals that face alike; those of narrow surfaces and of edges are smoothed.
 pub(crate) const ALIKE: f32 = 0.8;
 /// Tolerances from the surface within which another surface would have been told from it.
-const BESIDE: f32 = 4.0;
+const NEARBY: f32 = 4.0;
 /// Cosine to the line of sight from which on a surface is not too steep to be measured (65 degrees).
 pub(crate) const FACING: f32 = 0.42;
 
@@ -30,12 +30,58 @@ pub struct SurfacePlace {
 pub struct Judgement {
     /// On the piece's own surface, facing alike.
     pub confirmed: f32,
-    /// Where the sensor saw through, or beneath what the piece stands on.
+    /// Where the sensor saw through, or beneath what supports the piece.
     pub contradicted: f32,
     /// Visible, neither in front nor far behind, but not confirmed: at another angle, or just beneath.
-    pub astray: f32,
+    pub mismatched: f32,
     /// In sight and facing the sensor, but nothing was measured there.
     pub missing: f32,
+}
+
+/// Of surface places, how many are what; see [`Judgement`].
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Counts {
+    pub confirmed: u32,
+    pub contradicted: u32,
+    pub mismatched: u32,
+    pub missing: u32,
+}
+
+impl Counts {
+    pub fn add(&mut self, other: &Self) {
+        self.confirmed += other.confirmed;
+        self.contradicted += other.contradicted;
+        self.mismatched += other.mismatched;
+        self.missing += other.missing;
+    }
+
+    fn shares(&self, of: usize) -> Judgement {
+        let share = |count: u32| count as f32 / of.max(1) as f32;
+        Judgement {
+            confirmed: share(self.confirmed),
+            contradicted: share(self.contradicted),
+            mismatched: share(self.mismatched),
+            missing: share(self.missing),
+        }
+    }
+}
+
+/// A pose into the axes of an image, in single precision.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ImagePose {
+    rotation: [[f32; 3]; 3],
+    translation: [f32; 3],
+}
+
+impl ImagePose {
+    fn point(&self, point: &[f32; 3]) -> [f32; 3] {
+        let rotated = self.vector(point);
+        [0, 1, 2].map(|i| rotated[i] + self.translation[i])
+    }
+
+    fn vector(&self, vector: &[f32; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|i| dot(&self.rotation[i], vector))
+    }
 }
 
 /// What is known of a pixel.
@@ -90,17 +136,17 @@ pub struct DepthImage {
     /// Of the scan, in the image's axes.
     points: Vec<SurfacePlace>,
     pixels: Vec<Pixel>,
-    second: Option<Box<DepthImage>>,
+    second_viewpoint: Option<Box<DepthImage>>,
     /// In the image's axes.
-    floors: Vec<SurfacePlace>,
+    support_planes: Vec<SurfacePlace>,
 }
 
 impl DepthImage {
     /// Takes the image of a scan around the origin.
     ///
     /// `points` are those of the scan around a piece and `own` says which are the piece's; `spacing` is between
-    /// points; what is farther than `reach` from the line of sight is left out. `second` is another place that
-    /// points had to be seen from to be measured, as a triangulation scanner's camera is beside its laser.
+    /// points; what is farther than `reach` from the line of sight is left out. `second_viewpoint` is another
+    /// one that points had to be seen from to be measured, as a triangulation scanner's camera is beside its laser.
     ///
     /// # Panics
     /// If `own` has another length than `points`.
@@ -110,7 +156,7 @@ impl DepthImage {
         viewpoint: [f64; 3],
         spacing: f64,
         reach: f64,
-        second: Option<[f64; 3]>,
+        second_viewpoint: Option<[f64; 3]>,
     ) -> Self {
         assert_eq!(points.len(), own.len(), "one flag for each point");
         let distance = viewpoint.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -123,23 +169,24 @@ impl DepthImage {
             side,
             points: Vec::new(),
             pixels: Vec::new(),
-            second: second.map(|other| Box::new(Self::new(points, own, other, spacing, reach, None))),
-            floors: Vec::new(),
+            second_viewpoint: second_viewpoint
+                .map(|other| Box::new(Self::new(points, own, other, spacing, reach, None))),
+            support_planes: Vec::new(),
         };
         image.fill(points, own);
         image
     }
 
-    /// Lets the piece stand on planes, each given by a place and its normal: nothing of it is beneath them.
+    /// Lets planes support the piece, each given by a point and its normal: nothing of the piece is beneath them.
     #[must_use]
-    pub fn standing_on(mut self, floors: &[SurfacePlace]) -> Self {
-        self.floors = floors.iter().map(|floor| self.turned(floor)).collect();
+    pub fn supported_by(mut self, planes: &[SurfacePlace]) -> Self {
+        self.support_planes = planes.iter().map(|plane| self.in_image_axes(plane)).collect();
         self
     }
 
     fn fill(&mut self, points: &[SurfacePlace], own: &[bool]) {
         let side = self.side;
-        self.points = points.iter().map(|point| self.turned(point)).collect();
+        self.points = points.iter().map(|point| self.in_image_axes(point)).collect();
         let mut depths = vec![f32::INFINITY; side * side];
         let mut numbers = vec![0_u32; side * side];
         for (number, point) in (0..).zip(&self.points) {
@@ -185,14 +232,19 @@ impl DepthImage {
 
     /// Tells what the scan says about surface places that a pose moves into it.
     ///
-    /// `tolerance` is the height within which a place is on a surface.
+    /// `tolerance` is the distance within which a place is on a surface.
     pub fn judge(&self, pose: &RigidTransform, places: &[SurfacePlace], tolerance: f32) -> Judgement {
-        let (turn, shift) = self.composed(pose);
-        let mut counts = [0_u32; 4];
+        self.count(&self.to_image(pose), places, tolerance).shares(places.len())
+    }
+
+    /// How many of some places are what, under a pose into the image's axes.
+    pub(crate) fn count(&self, pose: &ImagePose, places: &[SurfacePlace], tolerance: f32) -> Counts {
+        let mut counts = Counts::default();
         for point in places {
-            let place = moved(&turn, &shift, &point.place);
-            if self.floors.iter().any(|floor| height_over(floor, &place) < -2.0 * tolerance) {
-                counts[1] += 1;
+            let place = pose.point(&point.place);
+            let is_beneath = |plane: &SurfacePlace| plane_distance(plane, &place) < -2.0 * tolerance;
+            if self.support_planes.iter().any(is_beneath) {
+                counts.contradicted += 1;
                 continue;
             }
             let Some((cell, depth)) = self.project(&place) else { continue };
@@ -200,42 +252,30 @@ impl DepthImage {
             match pixel.seen {
                 Seen::Between => {}
                 Seen::Nothing => {
-                    let normal = moved(&turn, &[0.0; 3], &point.normal);
-                    counts[3] += u32::from(self.should_be_seen(&place, &normal, tolerance));
+                    let normal = pose.vector(&point.normal);
+                    counts.missing += u32::from(self.should_be_seen(&place, &normal, tolerance));
                 }
                 seen => {
                     let own = seen == Seen::Own;
-                    let height = height_over(self.at(pixel), &place).abs();
-                    if own && height <= tolerance {
-                        let normal = moved(&turn, &[0.0; 3], &point.normal);
+                    let distance = plane_distance(self.at(pixel), &place).abs();
+                    if own && distance <= tolerance {
+                        let normal = pose.vector(&point.normal);
                         if dot(&normal, &self.at(pixel).normal) > ALIKE {
-                            counts[0] += 1;
+                            counts.confirmed += 1;
                             // On the surface, however its rim lies before it.
-                            counts[1] += u32::from(depth < pixel.front - 2.0 * tolerance);
+                            counts.contradicted += u32::from(depth < pixel.front - 2.0 * tolerance);
                             continue;
                         }
                     }
                     if depth < pixel.front - 2.0 * tolerance {
-                        counts[1] += 1;
-                    } else if own && height <= BESIDE * tolerance {
-                        counts[2] += 1;
+                        counts.contradicted += 1;
+                    } else if own && distance <= NEARBY * tolerance {
+                        counts.mismatched += 1;
                     }
                 }
             }
         }
-        let share = |count: u32| count as f32 / places.len().max(1) as f32;
-        let [confirmed, contradicted, astray, missing] = counts.map(share);
-        Judgement { confirmed, contradicted, astray, missing }
-    }
-
-    /// The same for many poses.
-    pub fn judge_all(
-        &self,
-        poses: &[RigidTransform],
-        places: &[SurfacePlace],
-        tolerance: f32,
-    ) -> Vec<Judgement> {
-        poses.iter().map(|pose| self.judge(pose, places, tolerance)).collect()
+        counts
     }
 
     /// For places that a pose moves to the piece's surface, or beside it: the points of the piece there, in the
@@ -246,17 +286,17 @@ impl DepthImage {
         places: &[SurfacePlace],
         tolerance: f32,
     ) -> Vec<Option<SurfacePlace>> {
-        let (turn, shift) = self.composed(pose);
+        let to_image = self.to_image(pose);
         let found = |point: &SurfacePlace| {
-            let place = moved(&turn, &shift, &point.place);
+            let place = to_image.point(&point.place);
             let pixel = &self.pixels[self.project(&place)?.0];
-            let normal = moved(&turn, &[0.0; 3], &point.normal);
+            let normal = to_image.vector(&point.normal);
             let near = pixel.seen == Seen::Own
-                && height_over(self.at(pixel), &place).abs() <= BESIDE * tolerance
+                && plane_distance(self.at(pixel), &place).abs() <= NEARBY * tolerance
                 && dot(&normal, &self.at(pixel).normal) > ALIKE;
             near.then(|| SurfacePlace {
-                place: self.turned_back(&self.at(pixel).place),
-                normal: self.turned_back(&self.at(pixel).normal),
+                place: self.from_image_axes(&self.at(pixel).place),
+                normal: self.from_image_axes(&self.at(pixel).normal),
             })
         };
         places.iter().map(found).collect()
@@ -265,10 +305,10 @@ impl DepthImage {
     /// Whether a place where nothing was measured faces both places it must be seen from, with nothing before it.
     fn should_be_seen(&self, place: &[f32; 3], normal: &[f32; 3], tolerance: f32) -> bool {
         self.faces(place, normal)
-            && self.second.as_ref().is_none_or(|second| {
-                let there = second.turned(&SurfacePlace {
-                    place: self.turned_back(place),
-                    normal: self.turned_back(normal),
+            && self.second_viewpoint.as_ref().is_none_or(|second| {
+                let there = second.in_image_axes(&SurfacePlace {
+                    place: self.from_image_axes(place),
+                    normal: self.from_image_axes(normal),
                 });
                 second.faces(&there.place, &there.normal) && !second.hides(&there.place, tolerance)
             })
@@ -285,7 +325,7 @@ impl DepthImage {
             let pixel = &self.pixels[cell];
             pixel.seen != Seen::Nothing && {
                 let behind = depth - self.distance - self.at(pixel).place[2];
-                behind.min(-height_over(self.at(pixel), place)) > 2.0 * tolerance
+                behind.min(-plane_distance(self.at(pixel), place)) > 2.0 * tolerance
             }
         })
     }
@@ -299,22 +339,22 @@ impl DepthImage {
         (depth > 0.0 && inside(x) && inside(y)).then(|| (x as usize * self.side + y as usize, depth))
     }
 
-    fn turned(&self, point: &SurfacePlace) -> SurfacePlace {
-        let turn = |v: &[f32; 3]| self.axes.map(|axis| dot(&axis, v));
-        SurfacePlace { place: turn(&point.place), normal: turn(&point.normal) }
+    fn in_image_axes(&self, point: &SurfacePlace) -> SurfacePlace {
+        let rotate = |v: &[f32; 3]| self.axes.map(|axis| dot(&axis, v));
+        SurfacePlace { place: rotate(&point.place), normal: rotate(&point.normal) }
     }
 
-    fn turned_back(&self, v: &[f32; 3]) -> [f32; 3] {
+    fn from_image_axes(&self, v: &[f32; 3]) -> [f32; 3] {
         [0, 1, 2].map(|i| (0..3).map(|k| self.axes[k][i] * v[k]).sum())
     }
 
     /// The pose, and then into the image's axes.
-    fn composed(&self, pose: &RigidTransform) -> ([[f32; 3]; 3], [f32; 3]) {
+    pub(crate) fn to_image(&self, pose: &RigidTransform) -> ImagePose {
         let axes = self.axes.map(|axis| Vector3::from(axis.map(f64::from)));
-        (
-            axes.map(|axis| [0, 1, 2].map(|column| axis.dot(&pose.rotation.column(column)) as f32)),
-            axes.map(|axis| axis.dot(&pose.translation) as f32),
-        )
+        ImagePose {
+            rotation: axes.map(|axis| [0, 1, 2].map(|column| axis.dot(&pose.rotation.column(column)) as f32)),
+            translation: axes.map(|axis| axis.dot(&pose.translation) as f32),
+        }
     }
 }
 
@@ -347,13 +387,9 @@ pub(crate) fn dot(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-fn moved(turn: &[[f32; 3]; 3], shift: &[f32; 3], v: &[f32; 3]) -> [f32; 3] {
-    [0, 1, 2].map(|i| dot(&turn[i], v) + shift[i])
-}
-
-/// The height of a place over the tangent plane of another.
-fn height_over(at: &SurfacePlace, place: &[f32; 3]) -> f32 {
-    dot(&at.normal, &[0, 1, 2].map(|i| place[i] - at.place[i]))
+/// The signed distance of a point from the tangent plane of another.
+fn plane_distance(at: &SurfacePlace, point: &[f32; 3]) -> f32 {
+    dot(&at.normal, &[0, 1, 2].map(|i| point[i] - at.place[i]))
 }
 
 #[cfg(test)]

@@ -38,6 +38,14 @@ pub enum Error {
         /// The number of points.
         len: usize,
     },
+    /// A number names a piece that is not among those given.
+    #[error("piece {piece} is not among {len} pieces")]
+    PieceOutOfRange {
+        /// The number that was asked for.
+        piece: usize,
+        /// The number of pieces.
+        len: usize,
+    },
     /// A neighbourhood of no points.
     #[error("at least one neighbour must be asked for")]
     NoNeighbors,

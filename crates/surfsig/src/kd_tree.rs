@@ -15,7 +15,8 @@ struct Split {
     value: f64,
 }
 
-/// Points sorted for searches of nearest neighbours. Of equally near ones the first in the caller's order counts.
+/// Points of `N` coordinates, three unless said otherwise, sorted for searches of nearest neighbours. Of equally near
+/// ones the first in the caller's order counts.
 ///
 /// ```
 /// use surfsig::KdTree;
@@ -29,27 +30,27 @@ struct Split {
 /// assert_eq!(found, [(0.0, 0), (1.0, 1), (1.0, 10)]);
 /// ```
 #[derive(Debug, Clone)]
-pub struct KdTree {
+pub struct KdTree<const N: usize = 3> {
     /// In the order of the leaves.
-    points: Vec<[f64; 3]>,
+    points: Vec<[f64; N]>,
     /// The caller's number of each.
     indices: Vec<u32>,
     /// Node i has the children 2 i + 1 and 2 i + 2. Each has half of its points, so ranges need not be kept.
     splits: Vec<Split>,
 }
 
-impl KdTree {
+impl<const N: usize> KdTree<N> {
     /// Sorts points, whose coordinates are finite.
     ///
     /// # Panics
     /// If there are 2^32 points or more.
     ///
     /// ```
-    /// assert!(surfsig::KdTree::new(&[]).is_empty());
+    /// assert!(surfsig::KdTree::<3>::new(&[]).is_empty());
     /// ```
-    pub fn new(points: &[[f64; 3]]) -> Self {
+    pub fn new(points: &[[f64; N]]) -> Self {
         let count = u32::try_from(points.len()).expect("fewer than 2^32 points");
-        let mut entries: Vec<([f64; 3], u32)> = points.iter().copied().zip(0..count).collect();
+        let mut entries: Vec<([f64; N], u32)> = points.iter().copied().zip(0..count).collect();
         let mut levels = 0;
         while points.len().div_ceil(1 << levels) > LEAF {
             levels += 1;
@@ -105,7 +106,7 @@ impl KdTree {
     /// let tree = surfsig::KdTree::new(&[[0.0; 3], [2.0, 0.0, 0.0]]);
     /// assert_eq!(tree.nearest([1.5, 0.0, 0.0], 1.0), Some((1, 0.25)));
     /// ```
-    pub fn nearest(&self, point: [f64; 3], reach: f64) -> Option<(u32, f64)> {
+    pub fn nearest(&self, point: [f64; N], reach: f64) -> Option<(u32, f64)> {
         self.nearest_where(point, reach, |_| true)
     }
 
@@ -117,7 +118,7 @@ impl KdTree {
     /// ```
     pub fn nearest_where(
         &self,
-        point: [f64; 3],
+        point: [f64; N],
         reach: f64,
         is_wanted: impl Fn(u32) -> bool,
     ) -> Option<(u32, f64)> {
@@ -128,7 +129,7 @@ impl KdTree {
             }
             best.0
         };
-        self.descend(point, 0, 0..self.len(), [0.0; 3], &mut take, &mut { reach * reach });
+        self.descend(point, 0, 0..self.len(), [0.0; N], &mut take, &mut { reach * reach });
         (best.1 < u32::MAX).then_some((best.1, best.0))
     }
 
@@ -141,8 +142,21 @@ impl KdTree {
     /// tree.nearest_k([2.0, 0.0, 0.0], 5, &mut found);
     /// assert_eq!(found, [(0.0, 1), (4.0, 0)]);
     /// ```
-    pub fn nearest_k(&self, point: [f64; 3], count: usize, found: &mut Vec<(f64, u32)>) {
+    pub fn nearest_k(&self, point: [f64; N], count: usize, found: &mut Vec<(f64, u32)>) {
+        self.nearest_k_within(point, count, f64::INFINITY, found);
+    }
+
+    /// The same among those within a distance.
+    ///
+    /// ```
+    /// let tree = surfsig::KdTree::new(&[[0.0; 3], [2.0, 0.0, 0.0]]);
+    /// let mut found = Vec::new();
+    /// tree.nearest_k_within([2.0, 0.0, 0.0], 5, 1.0, &mut found);
+    /// assert_eq!(found, [(0.0, 1)]);
+    /// ```
+    pub fn nearest_k_within(&self, point: [f64; N], count: usize, reach: f64, found: &mut Vec<(f64, u32)>) {
         found.clear();
+        let farthest = reach * reach;
         if count == 0 {
             return;
         }
@@ -150,7 +164,7 @@ impl KdTree {
             point,
             0,
             0..self.len(),
-            [0.0; 3],
+            [0.0; N],
             &mut |distance, index| {
                 let entry = (distance, index);
                 let full = found.len() == count;
@@ -161,9 +175,9 @@ impl KdTree {
                     let position = found.iter().rposition(|other| *other < entry).map_or(0, |last| last + 1);
                     found.insert(position, entry);
                 }
-                if found.len() == count { found[count - 1].0 } else { f64::INFINITY }
+                if found.len() == count { found[count - 1].0 } else { farthest }
             },
-            &mut { f64::INFINITY },
+            &mut { farthest },
         );
     }
 
@@ -175,14 +189,14 @@ impl KdTree {
     /// tree.within([0.0; 3], 1.0, &mut found);
     /// assert_eq!(found, [0, 2]);
     /// ```
-    pub fn within(&self, point: [f64; 3], reach: f64, found: &mut Vec<u32>) {
+    pub fn within(&self, point: [f64; N], reach: f64, found: &mut Vec<u32>) {
         found.clear();
         let limit = reach * reach;
         self.descend(
             point,
             0,
             0..self.len(),
-            [0.0; 3],
+            [0.0; N],
             &mut |distance, index| {
                 if distance <= limit {
                     found.push(index);
@@ -200,10 +214,10 @@ impl KdTree {
     /// quantization, 1993).
     fn descend(
         &self,
-        point: [f64; 3],
+        point: [f64; N],
         node: usize,
         range: Range<usize>,
-        gaps: [f64; 3],
+        gaps: [f64; N],
         take: &mut impl FnMut(f64, u32) -> f64,
         limit: &mut f64,
     ) {
@@ -242,27 +256,26 @@ fn range_of(len: usize, level: usize, node: usize) -> Range<usize> {
 }
 
 /// Splits points at the median along the axis in which they extend farthest.
-fn split(entries: &mut [([f64; 3], u32)]) -> Split {
+fn split<const N: usize>(entries: &mut [([f64; N], u32)]) -> Split {
     let Some(&(first, _)) = entries.first() else { return Split::default() };
     let (mut low, mut high) = (first, first);
     for (point, _) in entries.iter() {
-        for k in 0..3 {
+        for k in 0..N {
             low[k] = low[k].min(point[k]);
             high[k] = high[k].max(point[k]);
         }
     }
     let extent = |k: usize| high[k] - low[k];
-    let axis = (1..3).fold(0, |best, k| if extent(k) > extent(best) { k } else { best });
+    let axis = (1..N).fold(0, |best, k| if extent(k) > extent(best) { k } else { best });
     let middle = entries.len() / 2;
     let order =
-        |a: &([f64; 3], u32), b: &([f64; 3], u32)| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1));
+        |a: &([f64; N], u32), b: &([f64; N], u32)| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1));
     let (_, at, _) = entries.select_nth_unstable_by(middle, order);
     Split { axis: axis as u8, value: at.0[axis] }
 }
 
-fn squared_distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    let [x, y, z] = [0, 1, 2].map(|k| a[k] - b[k]);
-    x * x + y * y + z * z
+fn squared_distance<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum()
 }
 
 #[cfg(test)]
@@ -278,7 +291,7 @@ mod tests {
         )
     }
 
-    fn slow(points: &[[f64; 3]], point: [f64; 3]) -> Vec<(f64, u32)> {
+    fn slow<const N: usize>(points: &[[f64; N]], point: [f64; N]) -> Vec<(f64, u32)> {
         let mut all: Vec<(f64, u32)> = points.iter().map(|p| squared_distance(p, &point)).zip(0..).collect();
         all.sort_by(|a, b| a.partial_cmp(b).unwrap());
         all
@@ -297,13 +310,29 @@ mod tests {
                 inside.sort_unstable();
                 let mut found = Vec::new();
                 tree.within(at, reach, &mut found);
-                prop_assert_eq!(found, inside);
+                prop_assert_eq!(&found, &inside);
+                let mut nearest = Vec::new();
+                tree.nearest_k_within(at, 7, reach, &mut nearest);
+                prop_assert_eq!(&nearest, &expected[..inside.len().min(7)]);
             }
             let mut found = Vec::new();
             for count in [0, 1, 7, 400] {
                 tree.nearest_k(at, count, &mut found);
                 prop_assert_eq!(&found, &expected[..count.min(expected.len())]);
             }
+        }
+    }
+
+    #[test]
+    fn neighbours_in_four_dimensions_are_those_of_a_search_through_all() {
+        let number = |i: usize| (crate::random::uniform(i, 3) * 20.0).floor();
+        let points: Vec<[f64; 4]> = (0..2000).map(|i| [0, 1, 2, 3].map(|k| number(4 * i + k))).collect();
+        let tree = KdTree::new(&points);
+        let mut found = Vec::new();
+        for i in 0..100 {
+            let at = [0, 1, 2, 3].map(|k| 20.0 * crate::random::uniform(4 * i + k, 4));
+            tree.nearest_k(at, 16, &mut found);
+            assert_eq!(found, slow(&points, at)[..16]);
         }
     }
 

@@ -55,6 +55,7 @@ mod orientation;
 mod point_cloud;
 mod primitive;
 mod random;
+mod recurrences;
 mod registration;
 mod resolution;
 mod scan;
@@ -104,6 +105,10 @@ pub use odometry::{
 pub use orientation::consistent_directions;
 pub use point_cloud::{Offsets, PointCloud, Radius};
 pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
+pub use recurrences::{
+    OrientedScan, PieceAlignment, PieceSituation, PieceView, PosesOfPair, RecurrenceSettings, align_pieces,
+    judge_poses, refine_poses,
+};
 pub use registration::{REGISTRATION_STEPS, Registration, RegistrationSettings, register};
 pub use resolution::{COARSEST_STEP, Resolution};
 pub use scan::Scan;

@@ -43,17 +43,17 @@ def groups_of(
     return [members for number, members in sorted(group_of.items()) if members[0] == number]
 
 
-def ways_from_first(members: list[int], scores: Array) -> list[tuple[int, int]]:
-    """Give the steps (from, to) that reach all members from the first over the best matches.
+def best_match_tree(members: list[int], scores: Array) -> list[tuple[int, int]]:
+    """Give the maximum spanning tree of members by their scores (Prim): its edges (from, to).
 
-    A maximum spanning tree, in the order in which members are reached.
+    The first member is the root; edges are in the order in which they reach new members.
     """
-    steps: list[tuple[int, int]] = []
+    edges: list[tuple[int, int]] = []
     reached = [members[0]]
     while len(reached) < len(members):
         left = [member for member in members if member not in reached]
         table = scores[np.ix_(reached, left)]
         row, column = np.unravel_index(int(table.argmax()), table.shape)
-        steps.append((reached[int(row)], left[int(column)]))
+        edges.append((reached[int(row)], left[int(column)]))
         reached.append(left[int(column)])
-    return steps
+    return edges

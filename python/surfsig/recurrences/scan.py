@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig._surfsig import PieceView, RecurrenceSettings
 from surfsig.curvature import extract
 from surfsig.errors import InvalidInputError
 from surfsig.extraction import Extraction
@@ -13,7 +14,6 @@ from surfsig.recurrences.pieces import pieces_of
 from surfsig.recurrences.result import Piece
 from surfsig.recurrences.sensor_position import SensorPosition
 from surfsig.recurrences.shadows import Region, places_without_points
-from surfsig.recurrences.view import View, view_of
 from surfsig.spacing import point_spacing
 from surfsig.surfaces import Surfaces
 
@@ -70,8 +70,8 @@ class ScanPieces:
         center = self.cloud.offsets[piece].mean(axis=0, dtype=np.float64) + self.cloud.origin
         return Piece(self.number, piece, surfaces, center)
 
-    def views(self, length: float) -> list[View]:
-        """Prepare the pieces for alignment; `length` is the unit of the distances of pairs of points."""
+    def views(self, pair_unit: float, settings: RecurrenceSettings | None) -> list[PieceView]:
+        """Prepare the pieces for alignment; `pair_unit` is that of the distances of pairs of points."""
         if not self.pieces:
             return []
         sensor = SensorPosition(self.cloud, self._regions(), self.spacing)
@@ -88,16 +88,21 @@ class ScanPieces:
             rows = all_rows[known[all_rows]] if known[all_rows].any() else all_rows
             viewpoint = sensor.viewpoint_of(piece)
             views.append(
-                view_of(
-                    rows,
+                PieceView(
                     self.points,
                     normals,
-                    viewpoint=viewpoint,
-                    second=None if sensor.second is None else viewpoint + sensor.second,
-                    supports=[(place, normal) for _, place, normal in self._beneath(rows)],
+                    rows,
+                    viewpoint=viewpoint.tolist(),
+                    second_viewpoint=None
+                    if sensor.to_second is None
+                    else (viewpoint + sensor.to_second).tolist(),
+                    support_planes=[
+                        (place.tolist(), normal.tolist()) for _, place, normal in self._beneath(rows)
+                    ],
                     spacing=self.spacing,
-                    length=length,
                     tolerance=tolerance,
+                    pair_unit=pair_unit,
+                    settings=settings,
                 )
             )
         return views

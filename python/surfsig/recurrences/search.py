@@ -7,24 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig._surfsig import PieceView, RecurrenceSettings
 from surfsig.alignment.free_directions import free_directions
 from surfsig.arguments import progress_callback, thread_count, whole_number
 from surfsig.defaults import (
     RECURRENCE_CONFIDENCE,
     RECURRENCE_POINTS,
     RECURRENCE_SCORE,
-    RECURRENCE_SEED,
 )
 from surfsig.errors import InvalidInputError
 from surfsig.geometry import rotate
 from surfsig.progress import ProgressCallback
 from surfsig.recurrences.equal_surfaces import equal_surfaces
-from surfsig.recurrences.grouping import groups_of, ways_from_first
+from surfsig.recurrences.grouping import best_match_tree, groups_of
 from surfsig.recurrences.main_surface import main_surface
-from surfsig.recurrences.matching import Pairs, agreement_of, matched_pairs, poses_from, scores_of
+from surfsig.recurrences.matching import Pairs, PieceMatcher, poses_from, scores_of
 from surfsig.recurrences.result import Piece, Recurrence, Recurrences
 from surfsig.recurrences.scan import ScanPieces
-from surfsig.recurrences.view import View
 from surfsig.surfaces import Surfaces
 
 Array = NDArray[np.float64]
@@ -37,6 +36,7 @@ def find_recurrences(
     found: Surfaces | Sequence[Surfaces],
     *,
     min_points: int = RECURRENCE_POINTS,
+    settings: RecurrenceSettings | None = None,
     threads: int | None = None,
     progress: ProgressCallback | None = None,
 ) -> Recurrences:
@@ -46,8 +46,8 @@ def find_recurrences(
     pieces are taken away. Two pieces match where they have signatures in common, and where there is a pose in
     which each is what the other's sensor saw: on its surface, or hidden, but not where the sensor saw
     through, nor where it would have seen something, nor beneath what it stands on. So a half hidden piece
-    matches a whole one. Shadows on the planes tell whether points had to be seen from a second place, as by
-    the camera of a triangulation scanner. The result is always the same.
+    matches a whole one. Shadows on the planes tell whether points had to be seen from a second viewpoint,
+    as by the camera of a triangulation scanner. The result is always the same.
 
     Parameters
     ----------
@@ -56,11 +56,14 @@ def find_recurrences(
         per value of the field ``scan``); without, shadows tell the direction it was in, with a warning.
     min_points
         Fewest points of a piece.
+    settings
+        For experts; `RecurrenceSettings` describes what may be changed.
     threads
         Number of threads; by default the largest number that the scans' surfaces were found with, which is
         all cores where none was asked for. The result is the same.
     progress
-        Called with the pairs of pieces that have been compared, and of all.
+        Called with the number of pairs of pieces that have been aligned, and of all that are to be, some
+        twenty times a second.
 
     Returns
     -------
@@ -80,32 +83,34 @@ def find_recurrences(
     tell = progress_callback(progress)
     workers = thread_count(threads) or max((scan.threads or 0 for scan in scans), default=0) or None
     pieces: list[Piece] = []
-    views: list[View] = []
+    views: list[PieceView] = []
     signatures: list[Array] = []
     smooth: list[tuple[Array, Array]] = []
     labels = [np.full(len(scan.cloud), -1, np.int32) for scan in scans]
     prepared = [ScanPieces(number, scan, fewest, workers) for number, scan in enumerate(scans)]
     extents = [extent for scan in prepared for extent in scan.extents()]
-    length = _PAIR_UNIT * float(np.median(extents)) if extents else 1.0
+    pair_unit = _PAIR_UNIT * float(np.median(extents)) if extents else 1.0
     several = len(extents) > 1
     for scan in prepared:
         for points in scan.pieces:
             labels[scan.number][points] = len(pieces)
             pieces.append(scan.described(points))
         if several:
-            views += scan.views(length)
+            views += scan.views(pair_unit, settings)
             described = scan.signatures()
             signatures += [rows for rows, _, _ in described]
             smooth += [(points + scan.cloud.origin, normals) for _, points, normals in described]
     mains = [main_surface(piece, scans[piece.scan]) for piece in pieces]
-    pairs = matched_pairs(views, signatures, mains, RECURRENCE_SEED, workers, tell)
+    matcher = PieceMatcher(views, signatures, mains, settings=settings, threads=workers)
+    pairs = matcher.matched_pairs(tell)
     scores = scores_of(pairs, len(pieces))
-    middles = [
-        view.middle + scans[piece.scan].cloud.origin for view, piece in zip(views, pieces, strict=False)
+    centers = [
+        np.asarray(view.center) + scans[piece.scan].cloud.origin
+        for view, piece in zip(views, pieces, strict=False)
     ]
     groups = [
-        _recurrence(members, smooth[members[0]], pairs, scores, middles)
-        for members in groups_of(scores, RECURRENCE_SCORE, agreement_of(pairs, views))
+        _recurrence(members, smooth[members[0]], pairs, scores, centers)
+        for members in groups_of(scores, RECURRENCE_SCORE, matcher.agreement_with(pairs))
         if len(members) > 1
     ]
     return Recurrences(groups, pieces, equal_surfaces(scans, RECURRENCE_CONFIDENCE), labels, scores)
@@ -116,18 +121,18 @@ def _recurrence(
     smooth: tuple[Array, Array],
     pairs: Pairs,
     scores: Array,
-    middles: Sequence[Array],
+    centers: Sequence[Array],
 ) -> Recurrence:
     """Chain the poses of a group from its first member over the best matches.
 
     `smooth` are places and normals of the first member, from balls in which noise counts little;
-    `middles` are where the coordinates of each piece start.
+    `centers` are where the coordinates of each piece start.
     """
     pose = poses_from(members[0], members, pairs, scores)
-    score = {end: float(scores[start, end]) for start, end in ways_from_first(members, scores)}
+    score = {end: float(scores[start, end]) for start, end in best_match_tree(members, scores)}
     score[members[0]] = 1.0
     for member in members:
-        pose[member][:3, 3] += middles[member] - rotate(pose[member], middles[members[0]])
+        pose[member][:3, 3] += centers[member] - rotate(pose[member], centers[members[0]])
     free = free_directions(*smooth)
     return Recurrence(
         members,

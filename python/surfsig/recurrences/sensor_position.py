@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud
-from surfsig.recurrences.shadows import Region, direction_of_sensor, second_place
+from surfsig.recurrences.shadows import Region, direction_of_sensor, second_viewpoint
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class SensorPosition:
             known = cloud.viewpoint
             self.viewpoint = _guessed(regions, spacing) if known is None else np.asarray(known - cloud.origin)
         viewpoints = [self.viewpoint_of(region.piece) for region in regions]
-        self.second = second_place(regions, viewpoints, spacing)
+        self.to_second = second_viewpoint(regions, viewpoints, spacing)
         """The translation (3,) to a second viewpoint, as of a camera beside a laser, or None."""
 
     def viewpoint_of(self, piece: NDArray[np.int64]) -> Array:

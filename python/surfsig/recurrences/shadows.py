@@ -59,7 +59,7 @@ def places_without_points(support: Array, spacing: float) -> Array:
     return np.asarray(middle + grid[np.isinf(gap) & inside] @ axes)
 
 
-def second_place(regions: Sequence[Region], viewpoints: Sequence[Array], spacing: float) -> Array | None:
+def second_viewpoint(regions: Sequence[Region], viewpoints: Sequence[Array], spacing: float) -> Array | None:
     """Find from where else points had to be seen to be measured.
 
     Parameters

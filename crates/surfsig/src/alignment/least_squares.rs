@@ -4,7 +4,7 @@ use crate::geometry::RigidTransform;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// Distances of points along normals, linearised: how each changes with a small twist about the points' centre.
-pub(super) struct LinearisedDistances {
+pub(crate) struct LinearisedDistances {
     pub center: Vector3<f64>,
     /// Rotations in units of this length move points as far as translations do.
     pub unit: f64,

@@ -22,7 +22,7 @@ pub(crate) use gicp::gicp_with;
 pub use gicp::{GicpResult, GicpSettings, gicp};
 pub use gicp_cloud::GicpCloud;
 pub(crate) use gicp_cloud::{GicpTarget, plane_of};
-pub(crate) use least_squares::solve_determined;
+pub(crate) use least_squares::{LinearisedDistances, solve_determined};
 pub use observability::{FreeDirection, free_directions};
 pub(crate) use point_to_plane::{FACING_AWAY, OrientedSurface, cosine_towards, transformed};
 pub use point_to_surface::PointToSurfaceSettings;

@@ -15,17 +15,17 @@ fn board(columns: std::ops::Range<i32>, rows: std::ops::Range<i32>, z: f32) -> V
 }
 
 /// A square of 21 before a wall, with a strip from x = 16 to 22 where nothing was measured.
-fn image(second: Option<[f64; 3]>) -> DepthImage {
+fn image(second_viewpoint: Option<[f64; 3]>) -> DepthImage {
     let square = board(-10..11, -10..11, 0.0);
     let mut points = board(-30..31, -30..31, -10.0);
     points.retain(|point| point.place[0] < 16.0 || point.place[0] > 22.0);
     let own: Vec<bool> = (0..square.len() + points.len()).map(|number| number < square.len()).collect();
-    DepthImage::new(&[square, points].concat(), &own, FAR_ABOVE, 1.0, 30.0, second)
+    DepthImage::new(&[square, points].concat(), &own, FAR_ABOVE, 1.0, 30.0, second_viewpoint)
 }
 
 fn judged(image: &DepthImage, point: SurfacePlace) -> [f32; 4] {
     let found = image.judge(&RigidTransform::identity(), &[point], 0.3);
-    [found.confirmed, found.contradicted, found.astray, found.missing]
+    [found.confirmed, found.contradicted, found.mismatched, found.missing]
 }
 
 #[test]
@@ -39,14 +39,14 @@ fn what_is_on_hidden_through_and_missing() {
 }
 
 #[test]
-fn what_turns_its_back_is_neither_confirmed_nor_missing() {
+fn what_faces_away_is_neither_confirmed_nor_missing() {
     let away = |x| SurfacePlace { place: [x, 5.0, 0.0], normal: [0.0, 0.0, -1.0] };
     assert_eq!(judged(&image(None), away(5.0)), [0.0, 0.0, 1.0, 0.0]);
     assert_eq!(judged(&image(None), away(19.0)), [0.0; 4]);
 }
 
 #[test]
-fn nothing_is_missing_where_a_second_place_could_not_see() {
+fn nothing_is_missing_where_a_second_viewpoint_could_not_see() {
     // Seen from the left at 45 degrees, the square hides what is 9 behind its plane and 19 to the right.
     let beside = image(Some([-1e4, 0.0, 1e4]));
     assert_eq!(judged(&beside, at(19.0, 0.0, -15.0))[3], 0.0);
@@ -54,10 +54,10 @@ fn nothing_is_missing_where_a_second_place_could_not_see() {
 }
 
 #[test]
-fn nothing_is_beneath_the_floor() {
-    let standing = image(None).standing_on(&[at(0.0, 0.0, -5.0)]);
-    assert_eq!(judged(&standing, at(5.0, 5.0, -8.0)), [0.0, 1.0, 0.0, 0.0]);
-    assert_eq!(judged(&standing, at(5.0, 5.0, -4.0)), [0.0; 4]);
+fn nothing_is_beneath_a_support_plane() {
+    let supported = image(None).supported_by(&[at(0.0, 0.0, -5.0)]);
+    assert_eq!(judged(&supported, at(5.0, 5.0, -8.0)), [0.0, 1.0, 0.0, 0.0]);
+    assert_eq!(judged(&supported, at(5.0, 5.0, -4.0)), [0.0; 4]);
 }
 
 #[test]
