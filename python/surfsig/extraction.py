@@ -39,7 +39,7 @@ class Status(enum.IntEnum):
     DEGENERATE = 3
     """The points lie on a line or a conic and determine no paraboloid: no curvature."""
     NOT_CONVERGED = 4
-    """The surface's own axes did not converge; the values are those of the last iteration (edges, corners)."""
+    """The surface's own axes did not converge: the values are of the last iteration (edges, corners)."""
     OUTSIDE_VOCABULARY = 5
     """More curved than any atom of the frame: curvature, but no signature."""
     ONE_SIDED = 6
