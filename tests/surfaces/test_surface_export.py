@@ -5,6 +5,7 @@ import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import drawn_shapes
 import numpy as np
@@ -171,11 +172,12 @@ def transform_of(scene: object, name: str) -> Array:
 
 
 def read_dxf(path: Path) -> Parts:
-    import ezdxf
-    from ezdxf.render import MeshBuilder
+    from ezdxf.filemanagement import read
+    from ezdxf.render.mesh import MeshBuilder
 
-    drawing = ezdxf.read(io.StringIO(path.read_text()))
-    meshes = {entity.dxf.layer: MeshBuilder.from_polyface(entity) for entity in drawing.modelspace()}
+    drawing = read(io.StringIO(path.read_text()))
+    entities: list[Any] = list(drawing.modelspace())
+    meshes = {entity.dxf.layer: MeshBuilder.from_polyface(entity) for entity in entities}
     assert drawing.layers.get("0 plane").rgb != drawing.layers.get("1 cylinder").rgb
     return {name: (np.array(m.vertices), np.array([list(f) for f in m.faces])) for name, m in meshes.items()}
 

@@ -136,7 +136,7 @@ def _scene(parts: Sequence[_Part], paint: Callable[[_Part, Any], None]) -> Any:
 def _dxf(parts: Sequence[_Part]) -> bytes:
     """Write a polyface mesh for each surface, on a layer of its own; the drawing has no unit."""
     ezdxf = _ezdxf()
-    from ezdxf.render import MeshBuilder
+    from ezdxf.render.mesh import MeshBuilder
 
     drawing = ezdxf.new("R2010", units=0)
     for part in parts:
