@@ -103,7 +103,9 @@ pub use odometry::{
 };
 pub use orientation::consistent_directions;
 pub use point_cloud::{Offsets, PointCloud, Radius};
-pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
+pub use primitive::{
+    Primitive, PrimitiveFitOptions, PrimitiveUncertainty, SurfaceKind, fit_primitive, fit_primitive_with,
+};
 pub use registration::{REGISTRATION_STEPS, Registration, RegistrationSettings, register};
 pub use resolution::{COARSEST_STEP, Resolution};
 pub use scan::Scan;
