@@ -53,7 +53,15 @@ from surfsig.odometry import Odometry, ScanStatus, estimate_odometry
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import EqualSurfaces, Piece, Recurrence, Recurrences, find_recurrences
 from surfsig.registration import Registration, register
-from surfsig.shapes import fit_cylinder, fit_plane, fit_sphere
+from surfsig.shapes import (
+    fit_circle,
+    fit_cone,
+    fit_cylinder,
+    fit_line,
+    fit_plane,
+    fit_sphere,
+    fit_torus,
+)
 from surfsig.signature_similarity import flip_signatures, similarity, similarity_class, similarity_matrix
 from surfsig.surfaces import PointClass, Surface, Surfaces, find_surfaces
 from surfsig.units import unit_mismatch
@@ -105,9 +113,13 @@ __all__ = [
     "find_keypoints",
     "find_recurrences",
     "find_surfaces",
+    "fit_circle",
+    "fit_cone",
     "fit_cylinder",
+    "fit_line",
     "fit_plane",
     "fit_sphere",
+    "fit_torus",
     "flat_atom_length",
     "flip_signatures",
     "match_fields",
