@@ -52,7 +52,7 @@ def components(kind: str, points: Array, position: Array, axis: Array, sizes: Ar
     if kind == "cone":
         return np.asarray((away - sizes[0]) * math.cos(sizes[1]) - height * math.sin(sizes[1]))
     if kind == "torus":
-        return np.hypot(away - sizes[1], height) - sizes[0]
+        return np.asarray(np.hypot(away - sizes[1], height) - sizes[0])
     if kind == "circle":
         return np.concatenate([away - sizes[0], height])
     return beside.ravel()
@@ -72,7 +72,7 @@ def reference(kind: str, points: Array, weights: Array | None = None, fixed: str
             return found
         roots = np.sqrt(weights)
         # A line's components follow each other point by point, a circle's do not.
-        return found * (np.repeat(roots, 3) if kind == "line" else np.resize(roots, found.shape))
+        return np.asarray(found * (np.repeat(roots, 3) if kind == "line" else np.resize(roots, found.shape)))
 
     start = np.concatenate([np.zeros(5), sizes])
     found = least_squares(residuals, start, jac="3-point", xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=300)
