@@ -70,8 +70,9 @@ pub extern "C" fn surfsig_surface_kind_name(kind: u8) -> *const c_char {
 ///
 /// In the order of the covariance: a plane's offset along its normal and the normal's tilts; a sphere's centre and
 /// radius; of all others the offsets of the point, the tilts of the axis, and then the radius (cylinder), the radius
-/// and the half angle (cone), the offset along the axis, the major radius and the tube's radius (torus), the offset along
-/// the axis and the radius (circle); a line has no more. Offsets and tilts are along the two directions across the axis.
+/// and the half angle (cone), the offset along the axis, the major radius and the tube's radius (torus), the offset
+/// along the axis and the radius (circle); a line has no more. Offsets and tilts are along the two directions across the
+/// axis.
 #[unsafe(no_mangle)]
 pub extern "C" fn surfsig_surface_kind_parameters(kind: u8) -> usize {
     kind_of(kind).map_or(0, SurfaceKind::parameters)

@@ -6,8 +6,8 @@ use crate::code::{Failure, guarded, surfsig_code};
 use crate::kind::{kind_of, surfsig_surface_kind};
 use surfsig::{Primitive, SurfaceKind, fit_primitive};
 
-/// A plane, sphere, cylinder, cone or torus without a boundary, a circle or a line. Made by surfsig_fit_primitive(), freed by
-/// surfsig_primitive_free(). It refers to nothing of the caller's.
+/// A plane, sphere, cylinder, cone or torus without a boundary, a circle or a line. Made by surfsig_fit_primitive(),
+/// freed by surfsig_primitive_free(). It refers to nothing of the caller's.
 pub struct surfsig_primitive {
     fitted: Primitive,
     point: [f64; 3],

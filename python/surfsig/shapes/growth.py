@@ -12,7 +12,7 @@ from surfsig import _surfsig
 from surfsig.progress import Progress, ProgressCallback
 from surfsig.shapes.known import NOTHING_KNOWN, Known
 from surfsig.shapes.robust import MAX_PASSES, Array, fitted_to_inliers, near, rounding_of
-from surfsig.shapes.surface import ShapeKind
+from surfsig.shapes.surface import PARAMETERS, ShapeKind
 from surfsig.threads import map_in_threads
 
 Mask = NDArray[np.bool_]
@@ -109,7 +109,7 @@ def grown(
     if not found:
         return None
     # Of equal ones the first, which is the smallest start's.
-    best = min(found, key=lambda pair: (_relative_error(pair[0], points), -pair[1]))
+    best = min(found, key=lambda pair: (_relative_error(kind, pair[0], points), -pair[1]))
     return _without_border(kind, points, best[0], known)
 
 
@@ -182,11 +182,12 @@ def _stands_out(surface: _surfsig.Primitive, points: Array) -> bool:
     return bool(error < _DETERMINED * surface.radius and rms < _THIN * surface.radius)
 
 
-def _relative_error(shape: Grown, points: Array) -> float:
-    """Give the radius's standard error over the radius; 0 for a plane, infinity where it is not known."""
+def _relative_error(kind: ShapeKind, shape: Grown, points: Array) -> float:
+    """Give the relative standard error of the radius; 0 where there is none, infinity where it is unknown."""
     if np.isnan(shape.surface.radius):
         return 0.0
-    variance = shape.surface.uncertainty(points[shape.inliers])[0][-1, -1]
+    row = PARAMETERS[kind].index("radius")
+    variance = shape.surface.uncertainty(points[shape.inliers])[0][row, row]
     return float(np.sqrt(variance)) / shape.surface.radius if np.isfinite(variance) else np.inf
 
 

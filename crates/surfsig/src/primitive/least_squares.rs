@@ -132,6 +132,10 @@ pub(super) fn polish(start: Primitive, points: &[Vector], conditions: &Condition
     let mut primitive = start;
     for _ in 0..MAX_POLISHING_STEPS {
         let (step, left) = linear.step();
+        // Points extend by 1: each distance is rounded by some epsilons, and each sum by one of its terms' lengths.
+        if left <= f64::EPSILON * (4.0 + linear.sum().sqrt()) {
+            break;
+        }
         let better = (0..=MAX_HALVINGS).find_map(|halving| {
             let moved =
                 primitive.chart().moved(&all_parameters(&(&step * 0.5_f64.powi(halving as i32)), &free));

@@ -149,6 +149,41 @@ mod tests {
     }
 
     #[test]
+    fn two_rings_lead_to_their_cylinder() {
+        let points = revolved(60, |share| (0.5, if share < 0.5 { 0.0 } else { 2.0 }));
+        let pipe = fit_primitive(&points, SurfaceKind::Cylinder, None).unwrap();
+        assert!((pipe.radius() - 0.5).abs() < 1e-12);
+        assert!(Vector::from(pipe.axis()).cross(&Vector::new(0.6, 0.0, 0.8)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn circles_and_lines_are_fitted_in_space() {
+        let circle = fit_primitive(&revolved(5, |_| (0.5, 1.0)), SurfaceKind::Circle, None).unwrap();
+        assert!((circle.radius() - 0.5).abs() < 1e-14);
+        let centre = Vector::new(5.6, 6.0, 7.8);
+        assert!((Vector::from(circle.point()) - centre).norm() < 1e-13);
+        let line = fit_primitive(&revolved(5, |share| (0.0, share)), SurfaceKind::Line, None).unwrap();
+        assert!(Vector::from(line.axis()).cross(&Vector::new(0.6, 0.0, 0.8)).norm() < 1e-14);
+        assert!(line.radius().is_nan());
+    }
+
+    #[test]
+    fn what_is_known_is_kept() {
+        let points = revolved(40, |share| (0.5 + 0.01 * (9.0 * share).sin(), share));
+        let axis = Some([0.0, 0.0, 2.0]);
+        let options = PrimitiveFitOptions { radius: Some(0.48), axis, ..Default::default() };
+        let pipe = fit_primitive_with(&points, SurfaceKind::Cylinder, &options).unwrap();
+        assert!(pipe.radius() == 0.48 && pipe.axis() == [0.0, 0.0, 1.0]);
+        let covariance = pipe.uncertainty_with(&points, &options).covariance;
+        assert!(covariance[0] > 0.0 && (2..5).all(|kept| covariance[6 * kept] == 0.0));
+        // A radius is no plane's, and an axis no sphere's; weights are as many as points.
+        assert!(fit_primitive_with(&points, SurfaceKind::Plane, &options).is_none());
+        assert!(fit_primitive_with(&points, SurfaceKind::Sphere, &options).is_none());
+        let options = PrimitiveFitOptions { weights: Some(&[1.0; 3]), ..Default::default() };
+        assert!(fit_primitive_with(&points, SurfaceKind::Plane, &options).is_none());
+    }
+
+    #[test]
     fn what_determines_no_surface_is_none() {
         let circle: Vec<[f64; 3]> =
             (0..9).map(|i| f64::from(i).sin_cos()).map(|(x, y)| [x, y, 0.0]).collect();
