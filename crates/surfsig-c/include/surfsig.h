@@ -169,7 +169,7 @@ enum surfsig_status
    */
   SURFSIG_STATUS_DEGENERATE = 3,
   /**
-   * The axes did not settle: the values are those of the last turn. Typical of edges, corners and
+   * The axes did not converge: the values are those of the last iteration. Typical of edges, corners and
    * patches that are large against the radius of curvature.
    */
   SURFSIG_STATUS_NOT_CONVERGED = 4,
