@@ -39,6 +39,10 @@ CALLS: dict[str, Callable[..., Any]] = {
     "fit_sphere": lambda **how: surfsig.fit_sphere(BALL, near=[0, 0, 1], **how),
     "fit_cylinder": lambda **how: surfsig.fit_cylinder(BALL, robust=True, **how),
     "fit_plane": lambda **how: surfsig.fit_plane(POINTS, near=[0, 0, 0.25], **how),
+    "fit_cone": lambda **how: surfsig.fit_cone(BALL, **how),
+    "fit_torus": lambda **how: surfsig.fit_torus(BALL[:400], **how),
+    "fit_circle": lambda **how: surfsig.fit_circle(BALL, **how),
+    "fit_line": lambda **how: surfsig.fit_line(BALL, robust=True, **how),
     "remove_outliers": lambda **how: surfsig.remove_outliers(POINTS, **how),
     "downsample": lambda **how: surfsig.downsample(
         surfsig.PointCloud(POINTS, fields={"intensity": POINTS[:, 0].astype(np.float32)}), 0.1, **how

@@ -55,13 +55,16 @@ from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import EqualSurfaces, Piece, Recurrence, Recurrences, find_recurrences
 from surfsig.registration import Registration, register
 from surfsig.shapes import (
-    FormError,
     SurfaceAngle,
     SurfaceDistance,
     SurfacePatch,
+    fit_circle,
+    fit_cone,
     fit_cylinder,
+    fit_line,
     fit_plane,
     fit_sphere,
+    fit_torus,
 )
 from surfsig.signature_similarity import flip_signatures, similarity, similarity_class, similarity_matrix
 from surfsig.surfaces import (
@@ -86,7 +89,6 @@ __all__ = [
     "FileFormatError",
     "FindSettings",
     "FitUsed",
-    "FormError",
     "Frame",
     "FreeDirection",
     "GeoKeys",
@@ -130,9 +132,13 @@ __all__ = [
     "find_keypoints",
     "find_recurrences",
     "find_surfaces",
+    "fit_circle",
+    "fit_cone",
     "fit_cylinder",
+    "fit_line",
     "fit_plane",
     "fit_sphere",
+    "fit_torus",
     "flat_atom_length",
     "flip_signatures",
     "match_fields",

@@ -519,7 +519,12 @@ def find_surfaces(
     progress: Callable[[int, int], object] | None = None,
 ) -> tuple[NDArray[np.int32], list[dict[str, Any]]]: ...
 def fit_primitive(
-    points: NDArray[np.float64], kind: str, start: Primitive | None = None
+    points: NDArray[np.float64],
+    kind: str,
+    start: Primitive | None = None,
+    weights: NDArray[np.float64] | None = None,
+    radius: float | None = None,
+    axis: Sequence[float] | NDArray[np.float64] | None = None,
 ) -> Primitive | None: ...
 def voxel_representatives(
     points: NDArray[np.floating], *, origin: Sequence[float], voxel: float
@@ -690,8 +695,16 @@ class Primitive:
     def axis(self) -> NDArray[np.float64]: ...
     @property
     def radius(self) -> float: ...
+    @property
+    def major_radius(self) -> float: ...
+    @property
+    def half_angle(self) -> float: ...
     def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def uncertainty(
-        self, points: NDArray[np.float64]
+        self,
+        points: NDArray[np.float64],
+        weights: NDArray[np.float64] | None = None,
+        radius: float | None = None,
+        axis: Sequence[float] | NDArray[np.float64] | None = None,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]: ...
     def independent_error(self, points: NDArray[np.float64]) -> float: ...

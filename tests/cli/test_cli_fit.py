@@ -86,13 +86,48 @@ def test_robust_leaves_out_strays(shell: Callable[..., Any], ball: Path, tmp_pat
     assert values["count"] == 9000
 
 
+@pytest.mark.parametrize("kind", ["cone", "torus", "circle", "line"])
+def test_every_kind_has_a_command(shell: Callable[..., Any], tmp_path: Path, kind: str) -> None:
+    turn, other = np.random.default_rng(34).uniform(0, 2 * np.pi, (2, 200))
+    away = {
+        "cone": 0.5 + 0.1 * other,
+        "torus": 1 + 0.2 * np.cos(other),
+        "circle": np.ones(200),
+        "line": np.zeros(200),
+    }
+    height = {"cone": 0.1 * other, "torus": 0.2 * np.sin(other), "circle": 0 * turn, "line": turn}
+    points = np.column_stack([away[kind] * np.cos(turn), away[kind] * np.sin(turn), height[kind]])
+    surfsig.write(tmp_path / "a.ply", PointCloud(points))
+    values = json.loads(shell("fit", kind, tmp_path / "a.ply", "--axis", "0,0,2", "--json").out)
+    assert values["kind"] == kind
+    assert values["axis"] == pytest.approx([0, 0, 1], abs=1e-12)
+    assert values["form_error"] < 1e-6
+    out = shell("fit", kind, tmp_path / "a.ply").out
+    assert f"from the {kind}" in out
+    assert ("half angle" in out) == (kind == "cone")
+    assert ("major radius" in out) == (kind == "torus")
+
+
+def test_a_radius_that_noise_hides_is_not_told(shell: Callable[..., Any], tmp_path: Path) -> None:
+    rng = np.random.default_rng(35)
+    turn = rng.uniform(-0.26, 0.26, 300)
+    points = np.column_stack([np.cos(turn), np.sin(turn), rng.uniform(0, 1, 300)])
+    surfsig.write(tmp_path / "a.ply", PointCloud(points + 0.1 * rng.normal(size=points.shape)))
+    assert "not determined" in shell("fit", "cylinder", tmp_path / "a.ply").out
+    values = json.loads(shell("fit", "cylinder", tmp_path / "a.ply", "--json").out)
+    assert values["radius_determined"] is False
+    assert values["interval"][1] is None
+    assert "radius" not in values
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         (("sphere", "SCAN", "--near", "50,50,50", "--radius", 1), "scan.ply: near is 84.34 from"),
-        (("sphere", "SCAN", "--radius", 1), "give near, too"),
+        (("plane", "SCAN", "--radius", 1), "give near, too"),
         (("sphere", "SCAN", "--near", "1,2"), "'1,2' is not three numbers"),
-        (("cone", "SCAN"), "No such command 'cone'"),
+        (("egg", "SCAN"), "No such command 'egg'"),
+        (("cone", "SCAN", "--criterion", "minimum_zone"), "No such option"),
         (("plane", "absent.ply"), "No such file"),
     ],
 )

@@ -13,7 +13,7 @@ from surface_points import Array
 import surfsig
 from surfsig import Surface, _surfsig, fit_cylinder, fit_plane, fit_sphere
 from surfsig.geometry import about, transform_points
-from surfsig.shapes.surface import KINDS, PARAMETERS, Kind, measured_surface
+from surfsig.shapes.surface import CURVE_KINDS, KINDS, PARAMETERS, Kind, ShapeKind, measured_surface
 
 DRAWN: dict[str, Array] = {
     "sphere": sphere(np.random.default_rng(41), 0.2, 0.01),
@@ -134,7 +134,8 @@ def test_both_describe_the_same_points_alike(kind: Kind) -> None:
 
 def test_the_parameters_are_the_cores() -> None:
     assert {kind: len(names) for kind, names in PARAMETERS.items()} == _surfsig.KIND_PARAMETERS
-    assert get_args(Kind) == KINDS == tuple(PARAMETERS)
+    assert get_args(Kind) == KINDS == tuple(PARAMETERS)[:5]
+    assert (*KINDS, *CURVE_KINDS) == get_args(ShapeKind) == tuple(PARAMETERS)
 
 
 def example(kind: Kind, covariance: Array | None = None) -> Surface:

@@ -86,7 +86,7 @@ def test_growing_does_not_depend_on_where_the_scan_lies() -> None:
         ({"near": [9, 9, 9], "radius": 0.1}, "near is .* from the nearest|no point is within the"),
         ({"near": [0, 0]}, "near must be three"),
         ({"near": [0, 0, 0], "radius": 0}, "radius must be a finite number above 0"),
-        ({"radius": 0.1}, "give near, too"),
+        ({"radius": -0.1}, "radius must be a finite number above 0"),
         ({"near": [-1, -1, 0], "radius": 0.3}, "determine no sphere"),
     ],
 )

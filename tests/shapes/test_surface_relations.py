@@ -110,7 +110,7 @@ def test_where_surfaces_meet() -> None:
         (lambda: FLOOR.distance_to(made("cylinder", [0, 0, 1], [0, 0, 1], 1.0)), "meets the plane at 90"),
         (lambda: BALL.angle_to(FLOOR), "a sphere has no direction"),
         (lambda: FLOOR.angle_to(BALL), "a sphere has no direction"),
-        (lambda: fit_plane(np.eye(3).repeat(9, 0)).form_error(np.zeros((3, 3))), "the cloud only 3 points"),
+        (lambda: fit_plane(np.eye(3).repeat(9, 0)).patch(np.zeros((3, 3))), "the cloud only 3 points"),
     ],
 )
 def test_what_has_no_meaning_is_refused(measure: Callable[[], object], message: str) -> None:
@@ -147,14 +147,10 @@ def test_the_gap_and_parallelism_of_planes_are_those_of_the_part_that_lies_oppos
 
 
 def test_the_form_error_is_the_spread_of_the_members() -> None:
-    rng = np.random.default_rng(5)
-    points = drawn_shapes.plane(rng, 0.01)
+    points = drawn_shapes.plane(np.random.default_rng(5), 0.01)
     surface = fit_plane(points)
-    found = surface.form_error(points)
-    distances = surface.distances(points)
-    assert (found.lowest, found.highest) == pytest.approx((distances.min(), distances.max()), abs=1e-12)
-    assert found.peak_to_valley == found.highest - found.lowest
-    assert found.std == pytest.approx(0.01, rel=0.1)
+    assert surface.form_error == pytest.approx(np.ptp(surface.distances(points)), abs=1e-12)
+    assert surface.deviation == pytest.approx(0.01, rel=0.1)
 
 
 TILTED = np.array([[math.cos(0.5), 0, math.sin(0.5)], [0, 1, 0], [-math.sin(0.5), 0, math.cos(0.5)]])

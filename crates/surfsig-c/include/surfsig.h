@@ -100,7 +100,7 @@ typedef uint8_t surfsig_scan_status;
 #endif // __cplusplus
 
 /**
- * What a surface is.
+ * What a surface is, or a curve.
  */
 enum surfsig_surface_kind
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -127,6 +127,14 @@ enum surfsig_surface_kind
    * A torus.
    */
   SURFSIG_SURFACE_KIND_TORUS = 4,
+  /**
+   * A circle in space: only surfsig_fit_primitive() takes it.
+   */
+  SURFSIG_SURFACE_KIND_CIRCLE = 5,
+  /**
+   * A straight line: only surfsig_fit_primitive() takes it.
+   */
+  SURFSIG_SURFACE_KIND_LINE = 6,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -161,7 +169,7 @@ enum surfsig_status
    */
   SURFSIG_STATUS_DEGENERATE = 3,
   /**
-   * The axes did not settle: the values are those of the last turn. Typical of edges, corners and
+   * The axes did not converge: the values are those of the last iteration. Typical of edges, corners and
    * patches that are large against the radius of curvature.
    */
   SURFSIG_STATUS_NOT_CONVERGED = 4,
@@ -294,8 +302,8 @@ typedef struct surfsig_odometry surfsig_odometry;
 typedef struct surfsig_options surfsig_options;
 
 /**
- * A plane, sphere, cylinder, cone or torus without a boundary. Made by surfsig_fit_primitive(), freed by
- * surfsig_primitive_free(). It refers to nothing of the caller's.
+ * A plane, sphere, cylinder, cone or torus without a boundary, a circle or a line. Made by surfsig_fit_primitive(),
+ * freed by surfsig_primitive_free(). It refers to nothing of the caller's.
  */
 typedef struct surfsig_primitive surfsig_primitive;
 
@@ -869,8 +877,9 @@ const char *surfsig_surface_kind_name(uint8_t kind);
  *
  * In the order of the covariance: a plane's offset along its normal and the normal's tilts; a sphere's centre and
  * radius; of all others the offsets of the point, the tilts of the axis, and then the radius (cylinder), the radius
- * and the half angle (cone), the offset along the axis, the major radius and the tube's radius (torus). Offsets and
- * tilts are along the two directions across the axis.
+ * and the half angle (cone), the offset along the axis, the major radius and the tube's radius (torus), the offset
+ * along the axis and the radius (circle); a line has no more. Offsets and tilts are along the two directions across the
+ * axis.
  */
 size_t surfsig_surface_kind_parameters(uint8_t kind);
 
@@ -1157,7 +1166,7 @@ const double *surfsig_primitive_point(const surfsig_primitive *primitive);
 const double *surfsig_primitive_axis(const surfsig_primitive *primitive);
 
 /**
- * Of a sphere or cylinder; of a cone at its point; of a torus's tube; NaN for a plane and for null.
+ * Of a sphere, cylinder or circle; of a cone at its point; of a torus's tube; NaN for a plane, a line and for null.
  */
 double surfsig_primitive_radius(const surfsig_primitive *primitive);
 

@@ -324,7 +324,7 @@ struct Uncertainty {
   double freedom;
 };
 
-/** A plane, sphere, cylinder, cone or torus without a boundary. */
+/** A plane, sphere, cylinder, cone or torus without a boundary, a circle or a line. */
 class Primitive {
 public:
   explicit Primitive(surfsig_primitive *owned) : handle_(owned) {}

@@ -6,8 +6,8 @@ use crate::code::{Failure, guarded, surfsig_code};
 use crate::kind::{kind_of, surfsig_surface_kind};
 use surfsig::{Primitive, SurfaceKind, fit_primitive};
 
-/// A plane, sphere, cylinder, cone or torus without a boundary. Made by surfsig_fit_primitive(), freed by
-/// surfsig_primitive_free(). It refers to nothing of the caller's.
+/// A plane, sphere, cylinder, cone or torus without a boundary, a circle or a line. Made by surfsig_fit_primitive(),
+/// freed by surfsig_primitive_free(). It refers to nothing of the caller's.
 pub struct surfsig_primitive {
     fitted: Primitive,
     point: [f64; 3],
@@ -60,6 +60,8 @@ pub extern "C" fn surfsig_primitive_kind(primitive: Option<&surfsig_primitive>) 
         Some(SurfaceKind::Cylinder) => surfsig_surface_kind::Cylinder,
         Some(SurfaceKind::Cone) => surfsig_surface_kind::Cone,
         Some(SurfaceKind::Torus) => surfsig_surface_kind::Torus,
+        Some(SurfaceKind::Circle) => surfsig_surface_kind::Circle,
+        Some(SurfaceKind::Line) => surfsig_surface_kind::Line,
     }
 }
 
@@ -77,7 +79,7 @@ pub extern "C" fn surfsig_primitive_axis(primitive: Option<&surfsig_primitive>) 
     primitive.map_or(std::ptr::null(), |primitive| primitive.axis.as_ptr())
 }
 
-/// Of a sphere or cylinder; of a cone at its point; of a torus's tube; NaN for a plane and for null.
+/// Of a sphere, cylinder or circle; of a cone at its point; of a torus's tube; NaN for a plane, a line and for null.
 #[unsafe(no_mangle)]
 pub extern "C" fn surfsig_primitive_radius(primitive: Option<&surfsig_primitive>) -> f64 {
     primitive.map_or(f64::NAN, |primitive| primitive.fitted.radius())

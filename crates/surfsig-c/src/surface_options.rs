@@ -2,7 +2,7 @@
 
 use crate::arrays::array;
 use crate::code::{Failure, set, surfsig_code};
-use crate::kind::kind_of;
+use crate::kind::surface_kind_of;
 use crate::options::thread_count;
 use crate::progress::{Progress, surfsig_progress};
 use std::ffi::c_void;
@@ -75,7 +75,7 @@ pub unsafe extern "C" fn surfsig_surface_options_set_kinds(
     set(options, |options| {
         // SAFETY: the caller gives `count` bytes.
         let kinds = unsafe { array(kinds, count, "kinds") }?;
-        options.search.kinds = kinds.iter().map(|&kind| kind_of(kind)).collect::<Result<_, _>>()?;
+        options.search.kinds = kinds.iter().map(|&kind| surface_kind_of(kind)).collect::<Result<_, _>>()?;
         Ok(())
     })
 }

@@ -91,7 +91,8 @@ mod _surfsig {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("STATUS_NAMES", surfsig::Status::ALL.map(surfsig::Status::name).to_vec())?;
         module.add("SCAN_STATUS_NAMES", surfsig::ScanStatus::ALL.map(surfsig::ScanStatus::name).to_vec())?;
-        let parameters = surfsig::SurfaceKind::ALL.map(|kind| (kind.name(), kind.parameters()));
+        let kinds = surfsig::SurfaceKind::ALL.into_iter().chain(surfsig::SurfaceKind::CURVES);
+        let parameters: Vec<(&str, usize)> = kinds.map(|kind| (kind.name(), kind.parameters())).collect();
         module.add("KIND_PARAMETERS", parameters.into_py_dict(module.py())?)?;
         module.add("FEWEST_SURFACE_POINTS", surfsig::FEWEST_SURFACE_POINTS)?;
         module.add("COARSEST_STEP", surfsig::COARSEST_STEP)?;

@@ -1,14 +1,15 @@
 //! One surface fitted to points by orthogonal distance, for Python.
 
 use crate::rows;
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, ToPyArray};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use surfsig::SurfaceKind;
+use surfsig::{PrimitiveFitOptions, SurfaceKind};
 
 /// The kind of a name.
 pub fn kind_of(name: &str) -> PyResult<SurfaceKind> {
-    let kind = SurfaceKind::ALL.into_iter().find(|kind| kind.name() == name);
+    let kinds = SurfaceKind::ALL.into_iter().chain(SurfaceKind::CURVES);
+    let kind = kinds.into_iter().find(|kind| kind.name() == name);
     kind.ok_or_else(|| PyValueError::new_err("unknown kind"))
 }
 
@@ -33,6 +34,16 @@ impl Primitive {
         self.0.radius()
     }
 
+    #[getter]
+    fn major_radius(&self) -> f64 {
+        self.0.major_radius()
+    }
+
+    #[getter]
+    fn half_angle(&self) -> f64 {
+        self.0.half_angle()
+    }
+
     fn distances<'py>(
         &self,
         py: Python<'py>,
@@ -42,15 +53,22 @@ impl Primitive {
         Ok(py.detach(|| self.0.distances(points)).to_pyarray(py))
     }
 
-    /// The covariance, the directions across the axis, and the degrees of freedom.
+    /// The covariance, the directions across the axis, and the degrees of freedom; with the weights of the fit, and
+    /// what it kept.
+    #[pyo3(signature = (points, weights=None, radius=None, axis=None))]
     #[expect(clippy::type_complexity, reason = "a tuple in Python")]
     fn uncertainty<'py>(
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'_, f64>,
+        weights: Option<PyReadonlyArray1<'_, f64>>,
+        radius: Option<f64>,
+        axis: Option<[f64; 3]>,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, f64)> {
         let points = rows::<f64, 3>(&points)?;
-        let found = py.detach(|| self.0.uncertainty(points));
+        let weights = weights.as_ref().map(|weights| weights.as_slice()).transpose()?;
+        let options = PrimitiveFitOptions { weights, radius, axis, ..Default::default() };
+        let found = py.detach(|| self.0.uncertainty_with(points, &options));
         let parameters = self.0.kind().parameters();
         let covariance = found.covariance.to_pyarray(py).reshape([parameters, parameters])?;
         Ok((covariance, found.across.as_flattened().to_pyarray(py).reshape([2, 3])?, found.freedom))
@@ -62,16 +80,21 @@ impl Primitive {
     }
 }
 
-/// The surface of a kind for which the sum of squared distances is least; `None` where the points determine none.
+/// The surface or curve of a kind for which the sum of squared distances is least; `None` where the points determine
+/// none.
 #[pyfunction]
-#[pyo3(signature = (points, kind, start=None))]
+#[pyo3(signature = (points, kind, start=None, weights=None, radius=None, axis=None))]
 pub fn fit_primitive(
     py: Python<'_>,
     points: PyReadonlyArray2<'_, f64>,
     kind: &str,
     start: Option<&Primitive>,
+    weights: Option<PyReadonlyArray1<'_, f64>>,
+    radius: Option<f64>,
+    axis: Option<[f64; 3]>,
 ) -> PyResult<Option<Primitive>> {
     let (points, kind) = (rows::<f64, 3>(&points)?, kind_of(kind)?);
-    let start = start.map(|start| &start.0);
-    Ok(py.detach(|| surfsig::fit_primitive(points, kind, start)).map(Primitive))
+    let weights = weights.as_ref().map(|weights| weights.as_slice()).transpose()?;
+    let options = PrimitiveFitOptions { start: start.map(|start| &start.0), weights, radius, axis };
+    Ok(py.detach(|| surfsig::fit_primitive_with(points, kind, &options)).map(Primitive))
 }

@@ -104,7 +104,9 @@ pub use odometry::{
 };
 pub use orientation::consistent_directions;
 pub use point_cloud::{Offsets, PointCloud, Radius};
-pub use primitive::{Primitive, PrimitiveUncertainty, SurfaceKind, fit_primitive};
+pub use primitive::{
+    Primitive, PrimitiveFitOptions, PrimitiveUncertainty, SurfaceKind, fit_primitive, fit_primitive_with,
+};
 pub use recurrences::{
     OrientedScan, PieceAlignment, PieceSituation, PieceView, PosesOfPair, RecurrenceSettings, align_pieces,
     judge_poses, refine_poses,

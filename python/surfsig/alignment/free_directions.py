@@ -61,14 +61,16 @@ def free_direction(
 
 
 def free_directions_of_surface(kind: str, point: Array, axis: Array) -> list[FreeDirection]:
-    """Give the free directions of a plane, sphere, cylinder, cone or torus without ends."""
+    """Give the free directions of a plane, sphere, cylinder, cone, torus, circle or line without ends."""
     none = np.full(3, np.nan)
     if kind == "sphere":
         return [FreeDirection("rotation", none, point)]
     rotation = FreeDirection("rotation", axis, point)
     if kind == "plane":
         return [rotation, *(FreeDirection("translation", along, none) for along in axes_across(axis))]
-    return [rotation, FreeDirection("translation", axis, none)] if kind == "cylinder" else [rotation]
+    return (
+        [rotation, FreeDirection("translation", axis, none)] if kind in ("cylinder", "line") else [rotation]
+    )
 
 
 def free_directions(points: Array, normals: Array) -> list[FreeDirection]:

@@ -1,7 +1,8 @@
-"""`surfsig fit`: a sphere, cylinder or plane in a scan, with its radius and how sure it is."""
+"""`surfsig fit`: a surface or a curve in a scan, with its size and how sure it is."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,18 +19,41 @@ if TYPE_CHECKING:
 
 @click.group("fit", no_args_is_help=True)
 def fit_command() -> None:
-    """Fit a sphere, a cylinder or a plane to a scan, and say how sure it is.
+    """Fit a surface, a circle or a line to a scan, and say how sure it is.
 
     \b
     Examples:
       surfsig fit sphere ball.ply                            all points are the sphere's
       surfsig fit sphere scan.ply --near 1.7,2.5,0           the one in a scan that is near a place
       surfsig fit cylinder scan.ply --near 0,0.1,0.7 --radius 0.03 --json | jq .interval
+      surfsig fit cylinder pipe.ply --radius 0.03 --axis 0,0,1   what is known is kept
+      surfsig fit plane plate.ply --criterion minimum_zone --json | jq .form_error
     """  # noqa: D301
 
 
-def _shape_command(name: str, fit: str, text: str) -> click.Command:
-    """Make the command of one shape: they differ in the function that fits."""
+_AXIS = click.option(
+    "--axis",
+    type=position,
+    metavar="X,Y,Z",
+    help="The direction of the axis or normal, of any length, where it is known.  [default: fitted]",
+)
+_CRITERION = click.option(
+    "--criterion",
+    type=click.Choice(["least_squares", "minimum_zone"]),
+    default="least_squares",
+    show_default=True,
+    help="minimum_zone: the largest distance is least, for flatness, roundness, cylindricity.",
+)
+
+
+def _shape_command(name: str, text: str) -> click.Command:
+    """Make the command of one shape: they differ in the function that fits, and in what it takes."""
+    import inspect
+
+    import surfsig
+
+    fit = getattr(surfsig, f"fit_{name}")
+    taken = inspect.signature(fit).parameters
 
     @click.argument("file", type=CLOUD)
     @click.option(
@@ -42,7 +66,8 @@ def _shape_command(name: str, fit: str, text: str) -> click.Command:
         "--radius",
         type=float,
         metavar="R",
-        help="With --near: of the ball to begin with, about the object's size.  [default: by the points]",
+        help="With --near: of the ball to begin with, about the object's size.  [default: by the points]  "
+        "Without: the radius that a sphere, cylinder or circle has, where it is known.",
     )
     @click.option("--robust", is_flag=True, help="Leave out points that are far from the surface.")
     @input_options
@@ -55,9 +80,10 @@ def _shape_command(name: str, fit: str, text: str) -> click.Command:
         robust: bool,
         threads: int | None,
         as_json: bool,
+        axis: tuple[float, float, float] | None = None,
+        criterion: str = "least_squares",
         **reading: Any,
     ) -> None:
-        import surfsig
         from surfsig.missing_returns import warn_of_missing_returns
 
         shown = on_terminal()
@@ -66,8 +92,15 @@ def _shape_command(name: str, fit: str, text: str) -> click.Command:
         warn_of_missing_returns(cloud, str(file))
         try:
             with progress_bar("fitting", "steps", shown=shown) as progress:
-                surface = getattr(surfsig, fit)(
-                    cloud, near=near, radius=radius, robust=robust, threads=threads, progress=progress
+                known = {"axis": axis, "criterion": criterion}
+                surface = fit(
+                    cloud,
+                    near=near,
+                    radius=radius,
+                    robust=robust,
+                    threads=threads,
+                    progress=progress,
+                    **{key: value for key, value in known.items() if key in taken},
                 )
         except surfsig.InvalidInputError as error:
             raise surfsig.InvalidInputError(f"{file}: {error}") from None
@@ -76,21 +109,36 @@ def _shape_command(name: str, fit: str, text: str) -> click.Command:
         else:
             print_table(str(file), _rows(surface, len(cloud)), err=False)
 
+    if "axis" in taken:
+        command = _AXIS(command)
+    if "criterion" in taken:
+        command = _CRITERION(command)
     return click.command(name, help=text, no_args_is_help=True)(command)
 
 
 def _rows(surface: Surface, points: int) -> list[tuple[str, str]]:
     rows = []
-    if surface.kind != "plane":
-        low, high = surface.interval
-        ends = " to ".join(rounded(end, surface.radius_std) for end in (low, high))
+    low, high = surface.interval
+    if not surface.radius_determined:
+        above = f"above {number(low)}" if low > 0 else "noise hides how the points bend"
+        rows.append(("radius", f"not determined, {above}"))
+    elif math.isfinite(surface.radius):
         size = with_error(surface.radius, surface.radius_std)
-        rows.append(("radius", f"{size}, {INTERVAL:.0%} interval {ends}"))
+        if math.isfinite(surface.radius_std) and surface.radius_std > 0:
+            ends = " to ".join(rounded(end, surface.radius_std) for end in (low, high))
+            size = f"{size}, {INTERVAL:.0%} interval {ends}"
+        rows.append(("radius", size))
+    if surface.kind == "torus":
+        rows.append(("major radius", with_error(surface.major_radius, surface.major_radius_std)))
+    if surface.kind == "cone":
+        degrees = with_error(math.degrees(surface.half_angle), math.degrees(surface.half_angle_std))
+        rows.append(("half angle", f"{degrees} degrees"))
     rows.append(("center", _with_errors(surface.center, surface.center_std)))
     if surface.kind != "sphere":
-        direction = "normal" if surface.kind == "plane" else "axis"
+        direction = {"plane": "normal", "line": "direction"}.get(surface.kind, "axis")
         rows.append((direction, _with_errors(surface.axis, surface.axis_std)))
     rows.append(("rms", f"{number(surface.rms)} from the {surface.kind}"))
+    rows.append(("form error", f"{number(surface.form_error)} from peak to valley"))
     rows.append(("points", f"{surface.count:,} of {points:,}"))
     return rows
 
@@ -100,9 +148,15 @@ def _with_errors(values: Any, errors: Any) -> str:
     return ", ".join(with_error(value, error) for value, error in pairs)
 
 
-for _command in (
-    _shape_command("sphere", "fit_sphere", "Fit a sphere to the points of FILE, or to one that is in it."),
-    _shape_command("cylinder", "fit_cylinder", "Fit a cylinder to the points of FILE, or to one in it."),
-    _shape_command("plane", "fit_plane", "Fit a plane to the points of FILE, or to one that is in it."),
+for _name, _article in (
+    ("sphere", "a sphere"),
+    ("cylinder", "a cylinder"),
+    ("plane", "a plane"),
+    ("cone", "a cone"),
+    ("torus", "a torus"),
+    ("circle", "a circle in space"),
+    ("line", "a straight line"),
 ):
-    fit_command.add_command(_command)
+    fit_command.add_command(
+        _shape_command(_name, f"Fit {_article} to the points of FILE, or to one that is in it.")
+    )

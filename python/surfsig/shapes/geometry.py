@@ -38,7 +38,7 @@ class Placement:
         return foot
 
     def distances(self, points: Array) -> Array:
-        """Give signed distances from the surface."""
+        """Give signed distances from the surface; of a curve those in space, without a sign."""
         if self.kind == "plane":
             return self.heights(points)
         if self.kind == "sphere":
@@ -47,10 +47,20 @@ class Placement:
         away, heights = self.away(points), self.heights(points)
         if self.kind == "cylinder":
             return away - self.radius
+        if self.kind == "line":
+            return away
+        if self.kind == "circle":
+            return np.hypot(away - self.radius, heights)
         if self.kind == "cone":
             sine, cosine = math.sin(self.half_angle), math.cos(self.half_angle)
             return (away - self.radius) * cosine - heights * sine
         return np.hypot(away - self.major_radius, heights) - self.radius
+
+    def form_error(self, points: Array) -> float:
+        """Measure distances peak to valley; of a circle those from its axis; of a line twice the largest."""
+        if self.kind == "line":
+            return 2 * float(self.away(points).max())
+        return float(np.ptp(self.away(points) if self.kind == "circle" else self.distances(points)))
 
     def turns(self, points: Array) -> Array:
         """Give angles about the axis."""
@@ -60,7 +70,7 @@ class Placement:
 
 def covered_arc(placement: Placement, points: Array) -> float:
     """Measure how far points go round: about the axis, or of a sphere as seen from its center."""
-    if placement.kind == "plane":
+    if placement.kind in ("plane", "line"):
         return math.nan
     if placement.kind == "sphere":
         towards = directions_of(points)

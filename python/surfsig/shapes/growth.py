@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from surfsig import _surfsig
 from surfsig.progress import Progress, ProgressCallback
+from surfsig.shapes.known import NOTHING_KNOWN, Known
 from surfsig.shapes.robust import MAX_PASSES, Array, fitted_to_inliers, near, rounding_of
-from surfsig.shapes.surface import Kind
+from surfsig.shapes.surface import PARAMETERS, ShapeKind
 from surfsig.threads import map_in_threads
 
 Mask = NDArray[np.bool_]
@@ -34,6 +35,18 @@ _AGREEMENT = 2
 _HOLDS = 0.95
 """Part of a shape's points that must hang together; the rest may be strays."""
 
+_BORDER_NEIGHBOURS = 16
+"""Nearest points of the scan that tell whether a point is at the border of a shape, ..."""
+
+_OTHERS = 3
+"""... by how many of them may be no points of the shape. Points of what is beside it are near its surface at
+the border, on one side of it: on simulated scans of balls on a table with noise of 1 % of the radius 0.7 %
+of the shape's points were the table's, and 75 to 85 of 100 intervals held the radius; without the border 92
+to 96 (tests/shapes/test_intervals_in_scans.py)."""
+
+_ENOUGH = 0.5
+"""Where less than this part of a shape is not at its border, it has no inside: all of it is fitted."""
+
 _FINEST = 2.0**-20
 """Edge of the finest cells, in extents of the points."""
 
@@ -46,12 +59,13 @@ class Grown(NamedTuple):
 
 
 def grown(
-    kind: Kind,
+    kind: ShapeKind,
     points: Array,
     place: Array,
     radius: float | None,
     threads: int | None = None,
     progress: ProgressCallback | None = None,
+    known: Known = NOTHING_KNOWN,
 ) -> Grown | None:
     """Fit a shape to the points around a place, then to all that are near its surface, until they stand.
 
@@ -73,6 +87,8 @@ def grown(
         Of those at hand, up to `_AGREEMENT` are used: so many starts are needed anyway.
     progress
         Called with the number of starts done, and of all.
+    known
+        The axis that is kept, and the weights of all points.
 
     Returns
     -------
@@ -85,7 +101,7 @@ def grown(
     for number in range(0, len(starts), _AGREEMENT):
         batch = starts[number : number + _AGREEMENT]
         shapes = map_in_threads(
-            partial(_from_seeds, kind, points), batch, threads, lambda _done, _total: done.advance(1)
+            partial(_from_seeds, kind, points, known), batch, threads, lambda _done, _total: done.advance(1)
         )
         if any(_agreed(shape, found) for shape in shapes):
             break
@@ -93,8 +109,29 @@ def grown(
     if not found:
         return None
     # Of equal ones the first, which is the smallest start's.
-    best = min(found, key=lambda pair: (_relative_error(pair[0], points), -pair[1]))
-    return best[0]
+    best = min(found, key=lambda pair: (_relative_error(kind, pair[0], points), -pair[1]))
+    return _without_border(kind, points, best[0], known)
+
+
+def _without_border(kind: ShapeKind, points: Array, shape: Grown, known: Known) -> Grown:
+    """Fit a shape again without its points beside others of the scan, some of which are taken for its own."""
+    from scipy.spatial import KDTree
+
+    members = np.flatnonzero(shape.inliers)
+    count = min(_BORDER_NEIGHBOURS, len(points) - 1)
+    if count < _BORDER_NEIGHBOURS or len(members) == len(points):
+        return shape
+    # The first neighbour is the point itself.
+    neighbours = KDTree(points).query(points[members], list(range(2, count + 2)))[1]
+    inside = members[(~shape.inliers[neighbours]).sum(axis=1) <= _OTHERS]
+    if len(inside) < max(_ENOUGH * len(members), _FEWEST):
+        return shape
+    again = known.fit(kind, points, inside, shape.surface)
+    if again is None:
+        return shape
+    chosen = np.zeros_like(shape.inliers)
+    chosen[inside] = True
+    return Grown(again, chosen)
 
 
 def _agreed(shape: Grown | None, found: list[tuple[Grown, int]]) -> bool:
@@ -123,8 +160,8 @@ def _starts(points: Array, place: Array, radius: float | None) -> list[NDArray[n
     return [order[:count] for count in counts]
 
 
-def _from_seeds(kind: Kind, points: Array, seeds: NDArray[np.intp]) -> Grown | None:
-    start = fitted_to_inliers(kind, points[seeds], robust=True)
+def _from_seeds(kind: ShapeKind, points: Array, known: Known, seeds: NDArray[np.intp]) -> Grown | None:
+    start = fitted_to_inliers(kind, points[seeds], robust=True, known=known.of(seeds))
     if start is None:
         return None
     surface, kept = start
@@ -132,7 +169,7 @@ def _from_seeds(kind: Kind, points: Array, seeds: NDArray[np.intp]) -> Grown | N
     chosen[seeds[kept]] = True
     if not _stands_out(surface, points[chosen]):
         return None
-    shape = _spread(kind, surface, points, chosen)
+    shape = _spread(kind, surface, points, chosen, known)
     return shape if shape and _stands_out(shape.surface, points[shape.inliers]) else None
 
 
@@ -145,11 +182,12 @@ def _stands_out(surface: _surfsig.Primitive, points: Array) -> bool:
     return bool(error < _DETERMINED * surface.radius and rms < _THIN * surface.radius)
 
 
-def _relative_error(shape: Grown, points: Array) -> float:
-    """Give the radius's standard error over the radius; 0 for a plane, infinity where it is not known."""
+def _relative_error(kind: ShapeKind, shape: Grown, points: Array) -> float:
+    """Give the relative standard error of the radius; 0 where there is none, infinity where it is unknown."""
     if np.isnan(shape.surface.radius):
         return 0.0
-    variance = shape.surface.uncertainty(points[shape.inliers])[0][-1, -1]
+    row = PARAMETERS[kind].index("radius")
+    variance = shape.surface.uncertainty(points[shape.inliers])[0][row, row]
     return float(np.sqrt(variance)) / shape.surface.radius if np.isfinite(variance) else np.inf
 
 
@@ -157,7 +195,9 @@ def _same(a: Mask, b: Mask) -> bool:
     return bool((a & b).sum() > _SAME * (a | b).sum())
 
 
-def _spread(kind: Kind, surface: _surfsig.Primitive, points: Array, chosen: Mask) -> Grown | None:
+def _spread(
+    kind: ShapeKind, surface: _surfsig.Primitive, points: Array, chosen: Mask, known: Known
+) -> Grown | None:
     """Take the points near the surface that hang together with those chosen, and fit it again, to the end."""
     # A few points may miss the gaps between a scanner's lines.
     cell = 2 * _longest_gap(points[chosen])
@@ -178,7 +218,7 @@ def _spread(kind: Kind, surface: _surfsig.Primitive, points: Array, chosen: Mask
                 break
             cell = gap
             continue
-        again = _surfsig.fit_primitive(points[new], kind, surface)
+        again = known.fit(kind, points, new, surface)
         if again is None:
             return None
         surface, chosen = again, new

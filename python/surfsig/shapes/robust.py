@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from surfsig import _surfsig
 from surfsig.progress import Progress, ProgressCallback
-from surfsig.shapes.surface import Kind
+from surfsig.shapes.known import NOTHING_KNOWN, Known
+from surfsig.shapes.surface import ShapeKind
 
 Array = NDArray[np.float64]
 
@@ -20,12 +21,23 @@ DEVIATIONS_PER_MEDIAN = 1.4826
 ROUNDING = 1e-12
 """Distances, in units of the points' extent, that rounding alone makes."""
 
+_LAST = 0.1
+"""Part of the limit in which the density of the distances at the limit is counted."""
+
+_MOST_ANSWER = 0.5
+"""What a shift brings in and out is at most this part of it: more is no density of noise."""
+
 MAX_PASSES = 50
 """Passes after which the choice of points is taken as it is; some ten are usual."""
 
 
 def fitted_to_inliers(
-    kind: Kind, points: Array, *, robust: bool, progress: ProgressCallback | None = None
+    kind: ShapeKind,
+    points: Array,
+    *,
+    robust: bool,
+    progress: ProgressCallback | None = None,
+    known: Known = NOTHING_KNOWN,
 ) -> tuple[_surfsig.Primitive, NDArray[np.bool_]] | None:
     """Fit a surface, and say which points count; `robust` leaves out those that are far from it.
 
@@ -34,7 +46,7 @@ def fitted_to_inliers(
     """
     passes = MAX_PASSES if robust else 0
     done = Progress(progress, 1 + passes)
-    surface = _surfsig.fit_primitive(points, kind)
+    surface = known.fit(kind, points)
     done.advance(1)
     if surface is None:
         return None
@@ -46,12 +58,33 @@ def fitted_to_inliers(
         if np.array_equal(chosen, inliers):
             break
         inliers = chosen
-        surface = _surfsig.fit_primitive(points[inliers], kind, surface)
+        surface = known.fit(kind, points, inliers, surface)
         done.advance(1)
         if surface is None:
             return None
     done.advance(passes)
     return surface, inliers
+
+
+def variance_factor(distances: Array) -> float:
+    """Give by how much a parameter's variance grows because far points were left out.
+
+    The residuals that are left vary less, but which are left depends on the fit: where it moves, points leave
+    on one side and come in on the other. The sum of residuals within +-T so changes by 1 - 2 T f(T) times a
+    translation, with their density f, instead of by once (the asymptotic variance of a skipped mean). The
+    density is counted in the last tenth before T.
+
+    Parameters
+    ----------
+    distances
+        (m,), of the points that were left.
+    """
+    sizes = np.abs(distances)
+    limit = FAR * DEVIATIONS_PER_MEDIAN * float(np.median(sizes))
+    if not limit > 0:
+        return 1.0
+    share = float(np.mean(sizes > (1 - _LAST) * limit)) / _LAST
+    return 1.0 / (1.0 - min(share, _MOST_ANSWER)) ** 2
 
 
 def rounding_of(points: Array) -> float:

@@ -59,7 +59,7 @@ pub fn fit_cylinder(moments: &Moments<f64>) -> Option<Cylinder> {
     let (placement, local) = Placement::of(moments, 5)?;
     let pencil = Pencil::new(&local);
     let mut starts: Vec<(f64, Vector3<f64>)> = (0..STARTS)
-        .map(spread_direction)
+        .map(|index| spread_direction(index, STARTS))
         .filter_map(|axis| Some((along(&pencil, &axis)?.mean_square, axis)))
         .collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -81,9 +81,9 @@ pub fn fit_cylinder(moments: &Moments<f64>) -> Option<Cylinder> {
     })
 }
 
-/// The given one of the directions to start from.
-fn spread_direction(index: usize) -> Vector3<f64> {
-    let z = (index as f64 + 0.5) / STARTS as f64;
+/// The given one of so many directions that are spread over half a sphere by the golden angle.
+pub(crate) fn spread_direction(index: usize, count: usize) -> Vector3<f64> {
+    let z = (index as f64 + 0.5) / count as f64;
     let (sine, cosine) = (index as f64 * 2.399_963_229_728_653).sin_cos();
     let rho = (1.0 - z * z).sqrt();
     Vector3::new(rho * cosine, rho * sine, z)

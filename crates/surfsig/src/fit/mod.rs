@@ -13,6 +13,7 @@ mod shape_error;
 mod sphere;
 mod taubin;
 
+pub(crate) use cylinder::spread_direction;
 pub use cylinder::{Cylinder, fit_cylinder};
 pub use implicit::{Quadric, SurfacePoint, fit_quadric};
 pub use kind::{FitKind, FitUsed};

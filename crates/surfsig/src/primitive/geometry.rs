@@ -25,7 +25,8 @@ pub struct Primitive {
 ///
 /// In this order: a plane's offset, and the tilts of its normal; a sphere's centre and radius; of all surfaces of
 /// revolution the shifts of the axis, its tilts, and then the radius (cylinder), the radius and the half angle
-/// (cone), the shift along the axis, the major radius and the tube's radius (torus).
+/// (cone), the shift along the axis, the major radius and the tube's radius (torus), the shift along the axis and the
+/// radius (circle); a line has shifts and tilts only.
 pub(crate) struct Chart {
     pub primitive: Primitive,
     pub across: [Vector; 2],
@@ -39,7 +40,7 @@ impl Primitive {
         self.kind
     }
 
-    /// On the plane or the axis, next to the mean of the points; the centre of a sphere or torus.
+    /// On the plane, the axis or the line, next to the mean of the points; the centre of a sphere, torus or circle.
     pub fn point(&self) -> [f64; 3] {
         self.point.into()
     }
@@ -50,9 +51,10 @@ impl Primitive {
         if self.kind == SurfaceKind::Sphere { [f64::NAN; 3] } else { self.axis.into() }
     }
 
-    /// Of a sphere or cylinder; of a cone at [`Self::point`]; of a torus's tube; not a number for a plane.
+    /// Of a sphere, cylinder or circle; of a cone at [`Self::point`]; of a torus's tube; not a number for a plane or a
+    /// line.
     pub fn radius(&self) -> f64 {
-        if self.kind == SurfaceKind::Plane { f64::NAN } else { self.radius }
+        if [SurfaceKind::Plane, SurfaceKind::Line].contains(&self.kind) { f64::NAN } else { self.radius }
     }
 
     /// Of a torus, from the axis to the middle of the tube; not a number for others.
@@ -65,7 +67,7 @@ impl Primitive {
         if self.kind == SurfaceKind::Cone { self.half_angle } else { f64::NAN }
     }
 
-    /// Signed distances of points: positive outside, or where a plane's normal points.
+    /// Signed distances of points: positive outside, or where a plane's normal points; from a curve without a sign.
     pub fn distances(&self, points: &[[f64; 3]]) -> Vec<f64> {
         let chart = self.chart();
         points.iter().map(|&point| chart.distance(&Vector::from(point))).collect()
@@ -77,12 +79,12 @@ impl Primitive {
         let height = from.dot(&self.axis);
         match self.kind {
             SurfaceKind::Plane => Self { point: place - height * self.axis, ..*self },
-            SurfaceKind::Cylinder | SurfaceKind::Cone => Self {
+            SurfaceKind::Cylinder | SurfaceKind::Cone | SurfaceKind::Line => Self {
                 point: self.point + height * self.axis,
                 radius: self.radius + height * self.half_angle.tan(),
                 ..*self
             },
-            SurfaceKind::Sphere | SurfaceKind::Torus => *self,
+            SurfaceKind::Sphere | SurfaceKind::Torus | SurfaceKind::Circle => *self,
         }
     }
 
@@ -97,6 +99,12 @@ impl Primitive {
         Self { point: self.point + by, ..*self }
     }
 
+    /// The surface in another unit of length.
+    pub(super) fn scaled(&self, by: f64) -> Self {
+        let (point, radius, major_radius) = (by * self.point, by * self.radius, by * self.major_radius);
+        Self { point, radius, major_radius, ..*self }
+    }
+
     pub(crate) fn chart(&self) -> Chart {
         let (sine, cosine) = self.half_angle.sin_cos();
         Chart { primitive: *self, across: axes_across(&self.axis), sine, cosine }
@@ -108,8 +116,8 @@ impl Primitive {
         let radius = self.radius > 1e-6 * extent && self.radius < flat * extent;
         finite
             && match self.kind {
-                SurfaceKind::Plane => true,
-                SurfaceKind::Sphere | SurfaceKind::Cylinder => radius,
+                SurfaceKind::Plane | SurfaceKind::Line => true,
+                SurfaceKind::Sphere | SurfaceKind::Cylinder | SurfaceKind::Circle => radius,
                 SurfaceKind::Cone => {
                     self.radius.abs() < flat * extent && (0.01..1.55).contains(&self.half_angle)
                 }
@@ -132,12 +140,26 @@ impl Chart {
                 let height = from.dot(&p.axis);
                 let away = (from - height * p.axis).norm();
                 match p.kind {
+                    SurfaceKind::Line => away,
+                    SurfaceKind::Circle => length(away - p.radius, height),
                     SurfaceKind::Cylinder => away - p.radius,
                     SurfaceKind::Cone => (away - p.radius) * self.cosine - height * self.sine,
                     _ => length(away - p.major_radius, height) - p.radius,
                 }
             }
         }
+    }
+
+    /// The point of a circle or line that is nearest to a point.
+    pub fn foot_on_curve(&self, point: &Vector) -> Vector {
+        let p = &self.primitive;
+        let from = point - p.point;
+        let along = from.dot(&p.axis) * p.axis;
+        if p.kind == SurfaceKind::Line {
+            return p.point + along;
+        }
+        let beside = from - along;
+        p.point + p.radius / beside.norm().max(f64::MIN_POSITIVE) * beside
     }
 
     /// The surface's normal next to a point.
@@ -153,13 +175,39 @@ impl Chart {
         let height = from.dot(&p.axis);
         let outward = (from - height * p.axis).normalize();
         match p.kind {
-            SurfaceKind::Cylinder => outward,
+            SurfaceKind::Cylinder | SurfaceKind::Line => outward,
+            SurfaceKind::Circle => (from - p.radius * outward).normalize(),
             SurfaceKind::Cone => self.cosine * outward - self.sine * p.axis,
             _ => (from - p.major_radius * outward).normalize(),
         }
     }
 
-    /// Signed distance of a point, and its derivatives by the parameters.
+    /// The components of a point's distance with their derivatives by the parameters: of a surface the first alone.
+    pub fn components(&self, point: &Vector) -> [(f64, [f64; MOST_PARAMETERS]); 2] {
+        let p = &self.primitive;
+        if p.kind.components() == 1 {
+            return [self.distance_and_derivatives(point), (0.0, [0.0; MOST_PARAMETERS])];
+        }
+        let from = point - p.point;
+        let height = from.dot(&p.axis);
+        let along = self.across.map(|direction| from.dot(&direction));
+        let mut by = [[0.0; MOST_PARAMETERS]; 2];
+        if p.kind == SurfaceKind::Line {
+            for i in 0..2 {
+                (by[i][i], by[i][2 + i]) = (-1.0, -height);
+            }
+            return [(along[0], by[0]), (along[1], by[1])];
+        }
+        let away = length(along[0], along[1]);
+        for i in 0..2 {
+            let outward = along[i] / away.max(f64::MIN_POSITIVE);
+            (by[0][i], by[0][2 + i], by[1][2 + i]) = (-outward, -height * outward, along[i]);
+        }
+        (by[1][4], by[0][5]) = (-1.0, -1.0);
+        [(away - p.radius, by[0]), (height, by[1])]
+    }
+
+    /// Signed distance of a point from a surface, and its derivatives by the parameters.
     pub fn distance_and_derivatives(&self, point: &Vector) -> (f64, [f64; MOST_PARAMETERS]) {
         let p = &self.primitive;
         let from = point - p.point;
@@ -224,7 +272,10 @@ impl Chart {
                     p.point += step[4] * p.axis;
                     p.major_radius += step[5];
                     p.radius += step[6];
-                } else {
+                } else if kind == SurfaceKind::Circle {
+                    p.point += step[4] * p.axis;
+                    p.radius += step[5];
+                } else if kind != SurfaceKind::Line {
                     p.radius += step[4];
                     p.half_angle += step.get(5).copied().unwrap_or(0.0);
                 }
@@ -251,10 +302,12 @@ fn length(x: f64, y: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn examples() -> [Primitive; 5] {
+    fn examples() -> [Primitive; 7] {
         let axis = Vector::new(0.36, -0.48, 0.8);
         let point = Vector::new(0.3, 0.2, -0.5);
-        SurfaceKind::ALL.map(|kind| Primitive {
+        let [plane, sphere, cylinder, cone, torus] = SurfaceKind::ALL;
+        let [circle, line] = SurfaceKind::CURVES;
+        [plane, sphere, cylinder, cone, torus, circle, line].map(|kind| Primitive {
             kind,
             point,
             axis,
@@ -269,18 +322,21 @@ mod tests {
         for primitive in examples() {
             let chart = primitive.chart();
             for place in [[0.9, 0.1, 0.2], [-0.7, 0.8, 0.4], [0.2, -1.1, 0.3]].map(Vector::from) {
-                let (distance, by) = chart.distance_and_derivatives(&place);
-                assert!((distance - chart.distance(&place)).abs() < 1e-14);
+                let components = chart.components(&place);
+                let square: f64 = components.iter().map(|(component, _)| component * component).sum();
+                assert!((square.sqrt() - chart.distance(&place).abs()).abs() < 1e-14);
                 for parameter in 0..primitive.kind.parameters() {
+                    // In the axes of the chart, which those of the moved surface are but for its tilt.
                     let changed = |by: f64| {
                         let mut step = [0.0; MOST_PARAMETERS];
                         step[parameter] = by;
-                        chart.moved(&step[..primitive.kind.parameters()]).chart().distance(&place)
+                        chart.moved(&step[..primitive.kind.parameters()]).chart().distance(&place).powi(2)
                     };
                     let slope = (changed(1e-5) - changed(-1e-5)) / 2e-5;
+                    let expected: f64 = components.iter().map(|(c, by)| 2.0 * c * by[parameter]).sum();
                     assert!(
-                        (slope - by[parameter]).abs() < 1e-8,
-                        "{:?} {parameter}: {slope} {by:?}",
+                        (slope - expected).abs() < 1e-8,
+                        "{:?} {parameter}: {slope} {expected}",
                         primitive.kind
                     );
                 }
@@ -290,12 +346,15 @@ mod tests {
 
     #[test]
     fn distances_are_those_of_formulas() {
-        let [_, _, cylinder, cone, torus] = examples().map(|p| p.chart());
+        let [_, _, cylinder, cone, torus, circle, line] = examples().map(|p| p.chart());
         // Straight out from the axis, at the point's height.
         let out = Vector::new(0.8, 0.6, 0.0);
         let at = |away: f64| Vector::new(0.3, 0.2, -0.5) + away * out;
         assert!((cylinder.distance(&at(1.0)) - 0.6).abs() < 1e-14);
         assert!((cone.distance(&at(1.0)) - 0.6 * 0.5_f64.cos()).abs() < 1e-14);
         assert!((torus.distance(&at(1.0)) - (0.3 - 0.4)).abs() < 1e-14);
+        let above = at(0.8) - 0.3 * Vector::new(0.36, -0.48, 0.8);
+        assert!((circle.distance(&above) - 0.5).abs() < 1e-14);
+        assert!((line.distance(&above) - 0.8).abs() < 1e-14);
     }
 }

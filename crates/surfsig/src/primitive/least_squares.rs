@@ -1,6 +1,8 @@
-//! Surfaces fitted by orthogonal distance: Levenberg and Marquardt's steps.
+//! Surfaces fitted by orthogonal distance: Levenberg and Marquardt's steps, then Gauss and Newton's to the last digits.
 
+use super::conditions::Conditions;
 use super::geometry::{MOST_PARAMETERS, Primitive, Vector};
+use super::linear::Linear;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// When the iterations of a fit end.
@@ -11,7 +13,7 @@ pub(crate) struct Termination {
     /// It has converged where a step gains less than this share of the sum of squares.
     relative_gain: f64,
     /// Radius, in the points' extents, from which on the surface is a plane.
-    flat: f64,
+    pub(super) flat: f64,
 }
 
 /// Among noise: what is left to gain is less than noise.
@@ -20,14 +22,30 @@ pub(crate) const QUICK: Termination = Termination { max_iterations: 30, relative
 /// Without noise, along the narrow valleys of small patches: to the exact surface.
 pub(crate) const EXACT: Termination = Termination { max_iterations: 200, relative_gain: 1e-7, flat: 100.0 };
 
-/// To the last digits, for points that somebody chose.
+/// For points that somebody chose: to where [`polish`] goes on.
 pub(super) const EXHAUSTIVE: Termination =
     Termination { max_iterations: 500, relative_gain: 1e-13, flat: 1e6 };
+
+/// To tell which of many starts lead to a small sum.
+pub(super) const SCREENING: Termination = Termination { max_iterations: 15, relative_gain: 1e-3, flat: 1e4 };
+
+/// Along the narrow valleys of short arcs, to where one minimum is told from another.
+pub(super) const SLIDING: Termination = Termination { max_iterations: 150, relative_gain: 1e-6, flat: 1e6 };
+
+/// Steps of [`polish`]; three are enough where the residuals are small beside the radius.
+const MAX_POLISHING_STEPS: usize = 200;
+
+/// Halvings of a step of [`polish`] that does not come closer.
+const MAX_HALVINGS: u32 = 5;
+
+/// Relative error of a sum of squares that is rounding's.
+const ROUNDING_OF_SUM: f64 = 1e-12;
 
 /// Distances that are nothing, in units of the points' extent.
 const NOTHING: f64 = 1e-12;
 
 /// A surface that was fitted to points.
+#[derive(Clone, Copy)]
 pub(crate) struct Fitted {
     pub primitive: Primitive,
     /// Root mean square of the distances.
@@ -42,14 +60,27 @@ pub(crate) fn refine(
     extent: f64,
     termination: Termination,
 ) -> Option<Fitted> {
-    let parameters = start.kind.parameters();
-    if points.len() <= parameters || !start.is_valid(extent, termination.flat) {
+    refine_with(start, points, extent, &Conditions::none(start.kind), termination)
+}
+
+/// The same with weights, and some parameters kept. The mean square is a weighted mean.
+pub(super) fn refine_with(
+    start: Primitive,
+    points: &[Vector],
+    extent: f64,
+    conditions: &Conditions,
+    termination: Termination,
+) -> Option<Fitted> {
+    let free = conditions.free_parameters();
+    let parameters = free.len();
+    if points.len() * start.kind.components() <= parameters || !start.is_valid(extent, termination.flat) {
         return None;
     }
     let mut damping = 1e-4;
     let mut primitive = start;
-    let (mut normal, mut gradient, mut sum) = equations(&primitive, points);
-    let nothing = (NOTHING * extent).powi(2) * points.len() as f64;
+    let (mut normal, mut gradient, mut sum) = equations(&primitive, points, conditions, &free);
+    let count: f64 = (0..points.len()).map(|point| conditions.weight(point)).sum();
+    let nothing = (NOTHING * extent).powi(2) * count;
     for _ in 0..termination.max_iterations {
         if sum <= nothing {
             break;
@@ -66,8 +97,8 @@ pub(crate) fn refine(
             continue;
         };
         let step = -solver.solve(&gradient);
-        let moved = primitive.chart().moved(step.as_slice());
-        let (new_normal, new_gradient, new_sum) = equations(&moved, points);
+        let moved = primitive.chart().moved(&all_parameters(&step, &free));
+        let (new_normal, new_gradient, new_sum) = equations(&moved, points, conditions, &free);
         if new_sum <= sum {
             let gain = sum - new_sum;
             (primitive, normal, gradient) = (moved, new_normal, new_gradient);
@@ -86,28 +117,86 @@ pub(crate) fn refine(
         }
     }
     let valid = primitive.is_valid(extent, termination.flat) && sum.is_finite();
-    valid.then(|| Fitted { primitive, rms: (sum / points.len() as f64).sqrt() })
+    valid.then(|| Fitted { primitive, rms: (sum / count).sqrt() })
 }
 
-/// J^T J, J^T d and d^T d.
-fn equations(primitive: &Primitive, points: &[Vector]) -> (DMatrix<f64>, DVector<f64>, f64) {
+/// Gauss and Newton's steps by a triangle of the Jacobian, until rounding alone is left of the gradient.
+///
+/// The gradient, in the metric in which the sum of squares is round, is what becomes 0: a sum of squares stops to change
+/// where the parameters have half of their digits.
+pub(super) fn polish(start: Primitive, points: &[Vector], conditions: &Conditions) -> Primitive {
+    let free = conditions.free_parameters();
+    let Some(mut linear) = Linear::of(&start, points, conditions) else {
+        return start;
+    };
+    let mut primitive = start;
+    for _ in 0..MAX_POLISHING_STEPS {
+        let (step, left) = linear.step();
+        // Points extend by 1: each distance is rounded by some epsilons, and each sum by one of its terms' lengths.
+        if left <= f64::EPSILON * (4.0 + linear.sum().sqrt()) {
+            break;
+        }
+        let better = (0..=MAX_HALVINGS).find_map(|halving| {
+            let moved =
+                primitive.chart().moved(&all_parameters(&(&step * 0.5_f64.powi(halving as i32)), &free));
+            let next = Linear::of(&moved, points, conditions)?;
+            let closer = next.step().1 < left && next.sum() <= linear.sum() * (1.0 + ROUNDING_OF_SUM);
+            closer.then_some((moved, next))
+        });
+        match better {
+            Some((moved, next)) => (primitive, linear) = (moved, next),
+            None => break,
+        }
+    }
+    primitive
+}
+
+/// A step of all parameters, 0 for those that are kept.
+fn all_parameters(step: &DVector<f64>, free: &[usize]) -> [f64; MOST_PARAMETERS] {
+    let mut all = [0.0; MOST_PARAMETERS];
+    for (&parameter, &value) in free.iter().zip(step.iter()) {
+        all[parameter] = value;
+    }
+    all
+}
+
+/// J^T W J, J^T W d and d^T W d of the free parameters.
+fn equations(
+    primitive: &Primitive,
+    points: &[Vector],
+    conditions: &Conditions,
+    free: &[usize],
+) -> (DMatrix<f64>, DVector<f64>, f64) {
     let parameters = primitive.kind.parameters();
     let chart = primitive.chart();
     let mut normal = [[0.0; MOST_PARAMETERS]; MOST_PARAMETERS];
     let mut gradient = [0.0; MOST_PARAMETERS];
     let mut sum = 0.0;
-    for point in points {
-        let (distance, by) = chart.distance_and_derivatives(point);
-        sum += distance * distance;
+    let mut add = |weight: f64, distance: f64, by: &[f64; MOST_PARAMETERS]| {
+        sum += weight * distance * distance;
         for i in 0..parameters {
-            gradient[i] += by[i] * distance;
+            let weighted = weight * by[i];
+            gradient[i] += weighted * distance;
             for j in 0..=i {
-                normal[i][j] += by[i] * by[j];
+                normal[i][j] += weighted * by[j];
+            }
+        }
+    };
+    if primitive.kind.components() == 1 {
+        for (number, point) in points.iter().enumerate() {
+            let (distance, by) = chart.distance_and_derivatives(point);
+            add(conditions.weight(number), distance, &by);
+        }
+    } else {
+        for (number, point) in points.iter().enumerate() {
+            for (component, by) in chart.components(point) {
+                add(conditions.weight(number), component, &by);
             }
         }
     }
-    let normal = DMatrix::from_fn(parameters, parameters, |i, j| normal[i.max(j)][i.min(j)]);
-    (normal, DVector::from_column_slice(&gradient[..parameters]), sum)
+    let of = |i: usize| free[i];
+    let normal = DMatrix::from_fn(free.len(), free.len(), |i, j| normal[of(i.max(j))][of(i.min(j))]);
+    (normal, DVector::from_iterator(free.len(), free.iter().map(|&i| gradient[i])), sum)
 }
 
 #[cfg(test)]

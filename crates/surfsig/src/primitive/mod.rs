@@ -1,16 +1,21 @@
 //! One surface of a kind: its distance, its fit, and how sure that is.
 //!
-//! [`geometry`] measures distances and their derivatives, [`start`] reads a surface off points, [`least_squares`] makes
-//! the sum of squared distances least, [`uncertainty`] says from [`blocks`] of neighbours how sure the parameters are.
+//! [`geometry`] measures distances and their derivatives, [`start`] reads a surface off points, [`candidates`] finds
+//! those near the least sum of squared distances, [`least_squares`] makes it least by [`linear`] steps under
+//! [`conditions`], [`uncertainty`] says from [`blocks`] of neighbours how sure the parameters are.
 
 mod blocks;
+mod candidates;
+mod conditions;
 mod geometry;
 mod kind;
 mod least_squares;
+mod linear;
 mod start;
 mod uncertainty;
 
 pub(crate) use blocks::design_effect;
+pub use conditions::PrimitiveFitOptions;
 pub use geometry::Primitive;
 pub(crate) use geometry::{Chart, Vector, extent};
 pub use kind::SurfaceKind;
@@ -19,16 +24,18 @@ pub(crate) use start::{bent, start};
 pub use uncertainty::PrimitiveUncertainty;
 pub(crate) use uncertainty::uncertainty;
 
-use least_squares::EXHAUSTIVE;
-use uncertainty::Linear;
+use candidates::candidates;
+use least_squares::{EXHAUSTIVE, Fitted, polish, refine_with};
+use linear::Linear;
 
 /// Fits a surface to points: the sum of squared orthogonal distances is least.
 ///
-/// The fit begins from `start`, which must be of the same kind and near the points, or from what the points tell: of
-/// planes, spheres and cylinders their moments, of cones and tori the normals of the nearest 24 points around each.
+/// The fit begins from `start`, which must be of the same kind and near the points, or from what the points tell, for
+/// axes of all directions: the least of the minima that these lead to is taken. The sum of a curve (a circle or line) is
+/// that of the squared distances in space.
 ///
-/// `None` where the points are no more than the parameters, do not determine all of them (those of a circle no sphere),
-/// or are not finite.
+/// `None` where the points are no more than the parameters (of a curve, half of these), do not determine all of them
+/// (those of a circle no sphere), or are not finite.
 ///
 /// ```
 /// use surfsig::{fit_primitive, SurfaceKind};
@@ -43,27 +50,61 @@ use uncertainty::Linear;
 /// assert!(fit_primitive(&points[..5], SurfaceKind::Cylinder, None).is_none());
 /// ```
 pub fn fit_primitive(points: &[[f64; 3]], kind: SurfaceKind, start: Option<&Primitive>) -> Option<Primitive> {
-    if points.len() <= kind.parameters() {
+    fit_primitive_with(points, kind, &PrimitiveFitOptions { start, ..Default::default() })
+}
+
+/// Fits a surface of which something is known, or to points that do not count alike: see [`fit_primitive`].
+///
+/// `None` also where an option has no meaning for the kind or the points.
+///
+/// ```
+/// use surfsig::{fit_primitive_with, PrimitiveFitOptions, SurfaceKind};
+/// // The last point does not count.
+/// let points = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 1.0, 1.0], [0.5, 0.5, 7.0]];
+/// let options = PrimitiveFitOptions { weights: Some(&[1.0, 1.0, 1.0, 1.0, 0.0]), ..Default::default() };
+/// let plane = fit_primitive_with(&points, SurfaceKind::Plane, &options).unwrap();
+/// assert!((plane.axis()[2] - 1.0).abs() < 1e-15 && (plane.point()[2] - 1.0).abs() < 1e-15);
+/// ```
+pub fn fit_primitive_with(
+    points: &[[f64; 3]],
+    kind: SurfaceKind,
+    options: &PrimitiveFitOptions,
+) -> Option<Primitive> {
+    let conditions = options.conditions(kind);
+    if !options.are_valid(kind, points.len())
+        || points.len() * kind.components() <= conditions.free_parameters().len()
+        || points.len() < 3
+    {
         return None;
     }
-    // About their mean: squares of coordinates far from 0 lose digits.
+    // About their mean and in their own unit: squares of coordinates far from 0 lose digits. A power of 2 loses none.
     let mean = points.iter().map(|&p| Vector::from(p)).sum::<Vector>() / points.len() as f64;
-    let local: Vec<Vector> = points.iter().map(|&p| Vector::from(p) - mean).collect();
-    let extent = extent(&local);
-    if !(extent > 0.0 && extent.is_finite()) {
+    let about_mean: Vec<Vector> = points.iter().map(|&p| Vector::from(p) - mean).collect();
+    let unit = extent(&about_mean).log2().round().exp2();
+    if !(unit > 0.0 && unit.is_finite()) {
         return None;
     }
-    let starts = match start {
-        Some(start) if start.kind == kind => vec![start.shifted(&-mean)],
-        Some(_) => return None,
-        None => start::starts(kind, &local, extent),
+    let local: Vec<Vector> = about_mean.iter().map(|p| p / unit).collect();
+    let extent = extent(&local);
+    let radius = options.radius.map(|radius| radius / unit);
+    let local_options = PrimitiveFitOptions { radius, ..*options };
+    let starts = match options.start {
+        Some(start) => {
+            let axis = options.axis.map_or(start.axis, |axis| Vector::from(axis).normalize());
+            let local = start.shifted(&-mean).scaled(1.0 / unit);
+            vec![Primitive { axis, radius: radius.unwrap_or(local.radius), ..local }]
+        }
+        None => candidates(kind, &local, extent, &local_options),
     };
-    let fits =
-        starts.iter().filter_map(|start| refine(start.beside(&Vector::zeros()), &local, extent, EXHAUSTIVE));
-    let best = fits.min_by(|a, b| a.rms.total_cmp(&b.rms))?;
-    let primitive = best.primitive.beside(&Vector::zeros()).upward();
-    Linear::of(&primitive, &local)?;
-    Some(primitive.shifted(&mean))
+    let fits = starts.iter().filter_map(|start| {
+        refine_with(start.beside(&Vector::zeros()), &local, extent, &conditions, EXHAUSTIVE)
+    });
+    let best: Fitted = fits.min_by(|a, b| a.rms.total_cmp(&b.rms))?;
+    // The point at which shifts are counted is beside the mean of the points.
+    let beside = best.primitive.beside(&Vector::zeros());
+    let primitive = polish(beside, &local, &conditions).beside(&Vector::zeros()).upward();
+    Linear::of(&primitive, &local, &conditions)?;
+    primitive.is_valid(extent, EXHAUSTIVE.flat).then(|| primitive.scaled(unit).shifted(&mean))
 }
 
 #[cfg(test)]
@@ -105,6 +146,41 @@ mod tests {
         let from = middle - Vector::from(fitted.point());
         assert!(from.dot(&Vector::from(fitted.axis())).abs() < 1e-12);
         assert!(fit_primitive(&points, SurfaceKind::Sphere, Some(&near)).is_none());
+    }
+
+    #[test]
+    fn two_rings_lead_to_their_cylinder() {
+        let points = revolved(60, |share| (0.5, if share < 0.5 { 0.0 } else { 2.0 }));
+        let pipe = fit_primitive(&points, SurfaceKind::Cylinder, None).unwrap();
+        assert!((pipe.radius() - 0.5).abs() < 1e-12);
+        assert!(Vector::from(pipe.axis()).cross(&Vector::new(0.6, 0.0, 0.8)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn circles_and_lines_are_fitted_in_space() {
+        let circle = fit_primitive(&revolved(5, |_| (0.5, 1.0)), SurfaceKind::Circle, None).unwrap();
+        assert!((circle.radius() - 0.5).abs() < 1e-14);
+        let centre = Vector::new(5.6, 6.0, 7.8);
+        assert!((Vector::from(circle.point()) - centre).norm() < 1e-13);
+        let line = fit_primitive(&revolved(5, |share| (0.0, share)), SurfaceKind::Line, None).unwrap();
+        assert!(Vector::from(line.axis()).cross(&Vector::new(0.6, 0.0, 0.8)).norm() < 1e-14);
+        assert!(line.radius().is_nan());
+    }
+
+    #[test]
+    fn what_is_known_is_kept() {
+        let points = revolved(40, |share| (0.5 + 0.01 * (9.0 * share).sin(), share));
+        let axis = Some([0.0, 0.0, 2.0]);
+        let options = PrimitiveFitOptions { radius: Some(0.48), axis, ..Default::default() };
+        let pipe = fit_primitive_with(&points, SurfaceKind::Cylinder, &options).unwrap();
+        assert!(pipe.radius() == 0.48 && pipe.axis() == [0.0, 0.0, 1.0]);
+        let covariance = pipe.uncertainty_with(&points, &options).covariance;
+        assert!(covariance[0] > 0.0 && (2..5).all(|kept| covariance[6 * kept] == 0.0));
+        // A radius is no plane's, and an axis no sphere's; weights are as many as points.
+        assert!(fit_primitive_with(&points, SurfaceKind::Plane, &options).is_none());
+        assert!(fit_primitive_with(&points, SurfaceKind::Sphere, &options).is_none());
+        let options = PrimitiveFitOptions { weights: Some(&[1.0; 3]), ..Default::default() };
+        assert!(fit_primitive_with(&points, SurfaceKind::Plane, &options).is_none());
     }
 
     #[test]

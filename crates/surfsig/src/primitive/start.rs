@@ -10,43 +10,29 @@ use nalgebra::{Matrix2, Matrix3, Matrix4, SymmetricEigen, Vector2, Vector4};
 /// Nearest points that tell a point's normal.
 const NEAREST: usize = 24;
 
-/// Surfaces of a kind that go roughly through points about 0 which extend so far.
-pub(super) fn starts(kind: SurfaceKind, points: &[Vector], extent: f64) -> Vec<Primitive> {
+/// The sphere or cylinder that points' moments tell.
+pub(super) fn fitted_to_moments(kind: SurfaceKind, points: &[Vector]) -> Option<Primitive> {
     let positions: Vec<[f64; 3]> = points.iter().map(|&point| point.into()).collect();
-    let none = Primitive {
+    let moments = Moments::of_points(&positions);
+    let (point, axis, radius) = if kind == SurfaceKind::Sphere {
+        let sphere = fit_sphere(&moments)?;
+        (sphere.centre, [0.0, 0.0, 1.0], sphere.radius)
+    } else {
+        let cylinder = fit_cylinder(&moments)?;
+        (cylinder.centre, cylinder.axis, cylinder.radius)
+    };
+    Some(Primitive {
         kind,
-        point: Vector::zeros(),
-        axis: Vector::z(),
-        radius: 0.0,
+        point: point.into(),
+        axis: axis.into(),
+        radius,
         major_radius: 0.0,
         half_angle: 0.0,
-    };
-    match kind {
-        SurfaceKind::Plane => start(kind, points, &[]).into_iter().collect(),
-        SurfaceKind::Sphere => fit_sphere(&Moments::of_points(&positions))
-            .map(|sphere| Primitive { point: sphere.centre.into(), radius: sphere.radius, ..none })
-            .into_iter()
-            .collect(),
-        SurfaceKind::Cylinder => fit_cylinder(&Moments::of_points(&positions))
-            .map(|pipe| Primitive {
-                point: pipe.centre.into(),
-                axis: pipe.axis.into(),
-                radius: pipe.radius,
-                ..none
-            })
-            .into_iter()
-            .collect(),
-        SurfaceKind::Cone | SurfaceKind::Torus => {
-            let (known, normals) = with_normals(&positions);
-            let pipes = starts(SurfaceKind::Cylinder, points, extent);
-            let bent = pipes.iter().flat_map(|pipe| bent(pipe, kind, extent));
-            start(kind, &known, &normals).into_iter().chain(bent).collect()
-        }
-    }
+    })
 }
 
 /// The points whose normals their nearest points tell, and these.
-fn with_normals(positions: &[[f64; 3]]) -> (Vec<Vector>, Vec<Vector>) {
+pub(super) fn with_normals(positions: &[[f64; 3]]) -> (Vec<Vector>, Vec<Vector>) {
     let options = ExtractOptions { fit: FitKind::Quadric, ..Default::default() };
     let cloud = PointCloud::new_f64(positions);
     let nearest = Neighborhood::Nearest(NEAREST);
@@ -58,7 +44,7 @@ fn with_normals(positions: &[[f64; 3]]) -> (Vec<Vector>, Vec<Vector>) {
     known.filter(|(_, normal)| normal.iter().all(|c| c.is_finite())).unzip()
 }
 
-/// A surface of a kind that goes roughly through the points; `None` where they determine none.
+/// A surface of a kind that goes roughly through the points; `None` where they determine none, and for curves.
 pub(crate) fn start(kind: SurfaceKind, points: &[Vector], normals: &[Vector]) -> Option<Primitive> {
     let count = points.len() as f64;
     let centre = points.iter().sum::<Vector>() / count;
@@ -118,6 +104,7 @@ pub(crate) fn start(kind: SurfaceKind, points: &[Vector], normals: &[Vector]) ->
             let point = on_axis + mean.x * revolved.axis;
             Some(Primitive { point, axis, radius: mean.y, half_angle: slope.abs(), ..none })
         }
+        SurfaceKind::Circle | SurfaceKind::Line => None,
     }
 }
 
@@ -146,7 +133,7 @@ pub(crate) fn bent(simpler: &Primitive, kind: SurfaceKind, extent: f64) -> Vec<P
 }
 
 /// The eigenvector of the smallest eigenvalue.
-fn smallest(matrix: &Matrix3<f64>) -> Option<Vector> {
+pub(super) fn smallest(matrix: &Matrix3<f64>) -> Option<Vector> {
     if !matrix.iter().all(|entry| entry.is_finite()) {
         return None;
     }
@@ -155,7 +142,7 @@ fn smallest(matrix: &Matrix3<f64>) -> Option<Vector> {
 }
 
 /// Centre and radius of a circle near points: |q|^2 = 2 c q + k.
-fn circle(points: &[Vector2<f64>]) -> Option<(Vector2<f64>, f64)> {
+pub(super) fn circle(points: &[Vector2<f64>]) -> Option<(Vector2<f64>, f64)> {
     let mean = points.iter().sum::<Vector2<f64>>() / points.len() as f64;
     let mut normal = Matrix3::zeros();
     let mut right = Vector::zeros();

@@ -8,17 +8,13 @@
 //! blocks leave.
 
 use super::blocks::{block_count, spatial_blocks};
+use super::conditions::{Conditions, PrimitiveFitOptions};
 use super::geometry::{MOST_PARAMETERS, Primitive, Vector};
+use super::linear::Linear;
 use nalgebra::{DMatrix, DVector};
-
-/// A column of the Jacobian of which the others leave less than this part is a combination of theirs.
-const SINGULAR: f64 = 1e-9;
 
 /// Of a block's points alone, this part of what determines a parameter is all of it.
 const ALL: f64 = 1.0 - 1e-9;
-
-/// Rows that are taken into the triangle at a time.
-const ROWS: usize = 128;
 
 /// How sure the parameters of a surface are.
 #[derive(Debug, Clone)]
@@ -26,7 +22,8 @@ pub struct PrimitiveUncertainty {
     /// Covariance of the parameters, row by row; not a number where one block of the points is all that determines
     /// some. A plane's shift along its normal and the normal's tilts; a sphere's centre and radius; of all others the
     /// shifts of the point, the tilts of the axis, and then the radius (cylinder), the radius and the half angle (cone),
-    /// the shift along the axis, the major radius and the tube's radius (torus). Shifts and tilts are along `across`.
+    /// the shift along the axis, the major radius and the tube's radius (torus), the shift along the axis and the radius
+    /// (circle). Shifts and tilts are along `across`.
     pub covariance: Vec<f64>,
     /// Two unit vectors across the axis.
     pub across: [[f64; 3]; 2],
@@ -44,52 +41,41 @@ pub(crate) struct Uncertainty {
 /// From what the residuals have in common within blocks. `None` where the points, or all but those of one block, do not
 /// determine the parameters.
 pub(crate) fn uncertainty(primitive: &Primitive, points: &[Vector]) -> Option<Uncertainty> {
-    let linear = Linear::of(primitive, points)?;
-    let labels = spatial_blocks(points, block_count(points, &linear.residuals));
-    linear.uncertainty(&labels, primitive.kind.size())
+    uncertainty_with(primitive, points, &Conditions::none(primitive.kind))
 }
 
-/// A fit near its solution.
-pub(super) struct Linear {
-    parameters: usize,
-    /// Derivatives of the residuals by the parameters.
-    jacobian: Vec<[f64; MOST_PARAMETERS]>,
-    residuals: Vec<f64>,
-    /// The inverse of the Jacobian's triangle R, of J = Q R with columns of unit length at right angles in Q.
-    inverse: DMatrix<f64>,
+/// The same of a fit with weights, or that kept parameters: these have no variance and no covariance.
+fn uncertainty_with(
+    primitive: &Primitive,
+    points: &[Vector],
+    conditions: &Conditions,
+) -> Option<Uncertainty> {
+    let linear = Linear::of(primitive, points, conditions)?;
+    let components = primitive.kind.components();
+    let first: Vec<f64> = linear.residuals.iter().step_by(components).copied().collect();
+    // Noise is as wide as a block of a curve: blocks are pieces of the curve, not sides of it.
+    let chart = primitive.chart();
+    let feet: Option<Vec<Vector>> =
+        (components > 1).then(|| points.iter().map(|point| chart.foot_on_curve(point)).collect());
+    let places = feet.as_deref().unwrap_or(points);
+    let of_points = spatial_blocks(places, block_count(places, &first));
+    let labels: Vec<usize> =
+        of_points.iter().flat_map(|&label| std::iter::repeat_n(label, components)).collect();
+    let free = conditions.free_parameters();
+    // Of a radius that is kept no degrees of freedom are asked for.
+    let size = free.iter().position(|&parameter| parameter == primitive.kind.size()).unwrap_or(0);
+    let of_free = linear.uncertainty(&labels, size)?;
+    let parameters = primitive.kind.parameters();
+    let mut covariance = DMatrix::zeros(parameters, parameters);
+    for (i, &row) in free.iter().enumerate() {
+        for (j, &column) in free.iter().enumerate() {
+            covariance[(row, column)] = of_free.covariance[(i, j)];
+        }
+    }
+    Some(Uncertainty { covariance, ..of_free })
 }
 
 impl Linear {
-    /// `None` where the points do not determine the parameters.
-    pub fn of(primitive: &Primitive, points: &[Vector]) -> Option<Self> {
-        let chart = primitive.chart();
-        let (residuals, jacobian) = points.iter().map(|point| chart.distance_and_derivatives(point)).unzip();
-        Self::new(primitive.kind.parameters(), jacobian, residuals)
-    }
-
-    fn new(parameters: usize, jacobian: Vec<[f64; MOST_PARAMETERS]>, residuals: Vec<f64>) -> Option<Self> {
-        if jacobian.len() < parameters {
-            return None;
-        }
-        let mut triangle = DMatrix::<f64>::zeros(parameters, parameters);
-        for rows in jacobian.chunks(ROWS) {
-            let stacked = DMatrix::from_fn(parameters + rows.len(), parameters, |i, j| {
-                if i < parameters { triangle[(i, j)] } else { rows[i - parameters][j] }
-            });
-            triangle = stacked.qr().r();
-        }
-        let determined =
-            (0..parameters).all(|i| triangle[(i, i)].abs() > SINGULAR * triangle.column(i).norm());
-        let inverse = triangle.solve_upper_triangular(&DMatrix::identity(parameters, parameters))?;
-        determined.then_some(Self { parameters, jacobian, residuals, inverse })
-    }
-
-    /// The variance of a parameter if the residuals were independent and of one size.
-    pub fn independent_variance(&self, parameter: usize) -> f64 {
-        let squares: f64 = self.residuals.iter().map(|r| r * r).sum();
-        squares / (self.residuals.len() - self.parameters) as f64 * self.inverse.row(parameter).norm_squared()
-    }
-
     /// The covariance with independent blocks, and the freedom of one parameter's variance.
     fn uncertainty(&self, labels: &[usize], parameter: usize) -> Option<Uncertainty> {
         let parameters = self.parameters;
@@ -98,9 +84,8 @@ impl Linear {
         let mut normal = vec![[[0.0; MOST_PARAMETERS]; MOST_PARAMETERS]; count];
         let mut gradient = vec![[0.0; MOST_PARAMETERS]; count];
         for ((row, residual), &label) in self.jacobian.iter().zip(&self.residuals).zip(labels) {
-            let mut q = [0.0; MOST_PARAMETERS];
+            let q = self.orthonormal(row);
             for i in 0..parameters {
-                q[i] = (0..=i).map(|j| row[j] * self.inverse[(j, i)]).sum();
                 gradient[label][i] += q[i] * residual;
                 for j in 0..=i {
                     normal[label][i][j] += q[i] * q[j];
@@ -151,8 +136,33 @@ impl Primitive {
     /// assert!(shift < 0.01 / 30.0);
     /// ```
     pub fn uncertainty(&self, points: &[[f64; 3]]) -> PrimitiveUncertainty {
+        self.uncertainty_with(points, &PrimitiveFitOptions::default())
+    }
+
+    /// The same where [`crate::fit_primitive_with`] had these options: what it kept has no error.
+    ///
+    /// ```
+    /// use surfsig::{fit_primitive_with, PrimitiveFitOptions, SurfaceKind};
+    /// let points: Vec<[f64; 3]> = (0..90)
+    ///     .map(|i| (2.4 * f64::from(i), 0.01 * f64::from(i)))
+    ///     .map(|(t, z)| [t.cos() * (0.5 + 0.1 * z), t.sin() * 0.5, z])
+    ///     .collect();
+    /// let options = PrimitiveFitOptions { radius: Some(0.5), ..Default::default() };
+    /// let pipe = fit_primitive_with(&points, SurfaceKind::Cylinder, &options).unwrap();
+    /// let covariance = pipe.uncertainty_with(&points, &options).covariance;
+    /// assert!(covariance[0] > 0.0 && covariance[24] == 0.0);
+    /// ```
+    pub fn uncertainty_with(
+        &self,
+        points: &[[f64; 3]],
+        options: &PrimitiveFitOptions,
+    ) -> PrimitiveUncertainty {
         let parameters = self.kind.parameters();
-        let found = uncertainty(&self.shifted(&-self.point), &self.local(points));
+        let found = if options.are_valid(self.kind, points.len()) {
+            uncertainty_with(&self.shifted(&-self.point), &self.local(points), &options.conditions(self.kind))
+        } else {
+            None
+        };
         PrimitiveUncertainty {
             covariance: found.as_ref().map_or_else(
                 || vec![f64::NAN; parameters * parameters],
@@ -169,7 +179,8 @@ impl Primitive {
         if points.len() <= self.kind.parameters() {
             return f64::NAN;
         }
-        let linear = Linear::of(&self.shifted(&-self.point), &self.local(points));
+        let conditions = Conditions::none(self.kind);
+        let linear = Linear::of(&self.shifted(&-self.point), &self.local(points), &conditions);
         linear.map_or(f64::NAN, |linear| linear.independent_variance(self.kind.size()).sqrt())
     }
 
@@ -277,7 +288,7 @@ mod tests {
         }
         let fitted = refine(cylinder(), &points, 3.0, EXACT).unwrap().primitive;
         let said = uncertainty(&fitted, &points).unwrap().covariance[(4, 4)].sqrt();
-        let linear = Linear::of(&fitted, &points).unwrap();
+        let linear = Linear::of(&fitted, &points, &Conditions::none(fitted.kind)).unwrap();
         assert!(said > 3.0 * linear.independent_variance(4).sqrt());
     }
 

@@ -225,7 +225,7 @@ fn insignificant(found: &FoundSurface) -> Option<SurfaceKind> {
     let (size, error, simpler) = match found.kind {
         SurfaceKind::Sphere | SurfaceKind::Cylinder => (found.radius, found.radius_std, SurfaceKind::Plane),
         SurfaceKind::Cone => (found.half_angle, found.half_angle_std, SurfaceKind::Cylinder),
-        SurfaceKind::Plane | SurfaceKind::Torus => return None,
+        SurfaceKind::Plane | SurfaceKind::Torus | SurfaceKind::Circle | SurfaceKind::Line => return None,
     };
     (size < SIGNIFICANT * error).then_some(simpler)
 }
@@ -242,7 +242,7 @@ fn described(region: &Region, scene: &Scene) -> FoundSurface {
         _ => f64::NAN,
     };
     let radius_std = match p.kind {
-        SurfaceKind::Plane => f64::NAN,
+        SurfaceKind::Plane | SurfaceKind::Circle | SurfaceKind::Line => f64::NAN,
         SurfaceKind::Sphere => deviation(p.kind, 3),
         SurfaceKind::Cylinder | SurfaceKind::Cone => deviation(p.kind, 4),
         SurfaceKind::Torus => deviation(p.kind, 6),
