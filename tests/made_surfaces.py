@@ -38,6 +38,8 @@ def made(kind: Kind, point: Any, axis: Any = NAN3, radius: float = math.nan, **v
         "members": np.arange(0),
         "rms": 0.001,
         "deviation": 0.001,
+        "form_error": 0.004,
+        "fitted_radius": radius,
     }
     return Surface(**{**given, **values})
 
