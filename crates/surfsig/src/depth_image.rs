@@ -295,8 +295,8 @@ impl DepthImage {
                 && plane_distance(self.at(pixel), &place).abs() <= NEARBY * tolerance
                 && dot(&normal, &self.at(pixel).normal) > ALIKE;
             near.then(|| SurfacePlace {
-                place: self.from_image_axes(&self.at(pixel).place),
-                normal: self.from_image_axes(&self.at(pixel).normal),
+                place: self.out_of_image_axes(&self.at(pixel).place),
+                normal: self.out_of_image_axes(&self.at(pixel).normal),
             })
         };
         places.iter().map(found).collect()
@@ -307,8 +307,8 @@ impl DepthImage {
         self.faces(place, normal)
             && self.second_viewpoint.as_ref().is_none_or(|second| {
                 let there = second.in_image_axes(&SurfacePlace {
-                    place: self.from_image_axes(place),
-                    normal: self.from_image_axes(normal),
+                    place: self.out_of_image_axes(place),
+                    normal: self.out_of_image_axes(normal),
                 });
                 second.faces(&there.place, &there.normal) && !second.hides(&there.place, tolerance)
             })
@@ -344,7 +344,7 @@ impl DepthImage {
         SurfacePlace { place: rotate(&point.place), normal: rotate(&point.normal) }
     }
 
-    fn from_image_axes(&self, v: &[f32; 3]) -> [f32; 3] {
+    fn out_of_image_axes(&self, v: &[f32; 3]) -> [f32; 3] {
         [0, 1, 2].map(|i| (0..3).map(|k| self.axes[k][i] * v[k]).sum())
     }
 
