@@ -21,11 +21,11 @@ demo: build ## Run the main job and draw it into demo/
 	$(BIN)/surfsig paper --out $(OUT)/paper
 
 test: build ## Run the quick tests: Rust, its doc examples, Python without the slow ones
-	cargo test --workspace --quiet
+	cargo test --release --workspace --quiet
 	$(BIN)/python -m pytest
 
 test-all: build ## Run all tests, the slow ones too
-	cargo test --workspace --quiet
+	cargo test --release --workspace --quiet
 	$(BIN)/python -m pytest -m ""
 
 lint: build ## Formatters, linters and type checkers
@@ -82,7 +82,7 @@ check-wheel: wheel ## Use the wheel in an empty environment of each Python at ha
 	$(BIN)/python scripts/check_distribution.py dist/*.whl
 
 header: ## Write the C header anew from the sources
-	SURFSIG_WRITE_HEADER=1 cargo test --package surfsig-c --test header --quiet
+	SURFSIG_WRITE_HEADER=1 cargo test --release --package surfsig-c --test header --quiet
 
 install-c: ## Install the C and C++ interface: make install-c PREFIX=/usr/local
 	cmake -S crates/surfsig-c -B build/c

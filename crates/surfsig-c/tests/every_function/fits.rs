@@ -8,7 +8,7 @@ pub fn primitives(called: &mut Called) {
     let points = sphere();
     let cloud = Cloud::of(&points);
     call!(called, surfsig_fit_primitive(None, 1, None, out) gives INVALID);
-    call!(called, surfsig_fit_primitive(cloud.get(), 5, None, out) gives INVALID);
+    call!(called, surfsig_fit_primitive(cloud.get(), 7, None, out) gives INVALID);
     call!(called, surfsig_fit_primitive(cloud.get(), 1, None, null_mut()) gives INVALID);
     call!(called, surfsig_fit_primitive(cloud.get(), 1, None, out) gives OK);
     let primitive = unsafe { made.as_ref() };
@@ -18,7 +18,7 @@ pub fn primitives(called: &mut Called) {
     let room = numbers.as_mut_ptr();
     for points in odd_clouds() {
         let cloud = Cloud::of(&points);
-        for kind in 0..5 {
+        for kind in 0..7 {
             let code = call!(called, surfsig_fit_primitive(cloud.get(), kind, None, &mut other));
             assert!([OK, UNDETERMINED].contains(&code), "{}", last_error());
             surfsig_primitive_free(owned(std::mem::replace(&mut other, null_mut())));
