@@ -13,7 +13,7 @@ from surface_points import UTM, rotation
 from surface_scenes import cone, on_a_plane, torus
 
 from surfsig import _surfsig, geometry
-from surfsig.surfaces import KINDS
+from surfsig.shapes import CURVE_KINDS, KINDS
 
 UNDETERMINED, CANCELLED = 4, 5
 
@@ -276,7 +276,8 @@ def test_a_printed_matrix_is_the_rotation_next_to_it(c: CInterface) -> None:
 
 
 def test_kinds(c: CInterface) -> None:
-    names = [c.functions.surfsig_surface_kind_name(c_uint8(kind)) for kind in range(len(KINDS))]
-    assert names == [kind.encode() for kind in KINDS]
-    parameters = [c.functions.surfsig_surface_kind_parameters(c_uint8(kind)) for kind in range(len(KINDS))]
-    assert dict(zip(KINDS, parameters, strict=True)) == _surfsig.KIND_PARAMETERS
+    kinds = (*KINDS, *CURVE_KINDS)
+    names = [c.functions.surfsig_surface_kind_name(c_uint8(kind)) for kind in range(len(kinds))]
+    assert names == [kind.encode() for kind in kinds]
+    parameters = [c.functions.surfsig_surface_kind_parameters(c_uint8(kind)) for kind in range(len(kinds))]
+    assert dict(zip(kinds, parameters, strict=True)) == _surfsig.KIND_PARAMETERS
