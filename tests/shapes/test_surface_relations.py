@@ -10,7 +10,7 @@ import pytest
 from made_surfaces import made, moved
 from surface_points import UTM, Array, rotation
 
-from surfsig import InvalidInputError, PointCloud, Surface, fit_cylinder, fit_plane, fit_sphere
+from surfsig import InvalidInputError, PointCloud, Surface, fit_circle, fit_cylinder, fit_plane, fit_sphere
 
 FLOOR = made("plane", [0, 0, 0], [0, 0, 1])
 PIPE = made("cylinder", [0, 0, 2], [1, 0, 0], 0.5)
@@ -103,6 +103,13 @@ def test_where_surfaces_meet() -> None:
     assert "point" not in parallel.to_dict()
 
 
+ROUND = np.column_stack([np.cos(np.arange(9.0)), np.sin(np.arange(9.0)), np.zeros(9)])
+RNG = np.random.default_rng(0)
+ARC, ALONG = RNG.uniform(-0.1, 0.1, 300), RNG.uniform(0, 1, 300)
+HIDDEN = np.column_stack([np.cos(ARC), np.sin(ARC), ALONG]) + RNG.normal(0, 0.05, (300, 3))
+"""Part of a cylinder, whose noise hides that it is bent."""
+
+
 @pytest.mark.parametrize(
     ("measure", "message"),
     [
@@ -111,6 +118,8 @@ def test_where_surfaces_meet() -> None:
         (lambda: BALL.angle_to(FLOOR), "a sphere has no direction"),
         (lambda: FLOOR.angle_to(BALL), "a sphere has no direction"),
         (lambda: fit_plane(np.eye(3).repeat(9, 0)).patch(np.zeros((3, 3))), "the cloud only 3 points"),
+        (lambda: fit_circle(ROUND).patch(ROUND), "a circle has no area"),
+        (lambda: fit_cylinder(HIDDEN).patch(HIDDEN), "the radius of the cylinder is not determined"),
     ],
 )
 def test_what_has_no_meaning_is_refused(measure: Callable[[], object], message: str) -> None:

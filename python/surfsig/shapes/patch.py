@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.errors import InvalidInputError
 from surfsig.geometry import axes_across
 from surfsig.shapes.area import cell_width, unrolled
 from surfsig.shapes.geodesic import Faces, halved, sphere_with_points
@@ -95,6 +96,10 @@ class _Grid:
 
 def patch_of(surface: Surface, cloud: PointCloud) -> SurfacePatch:
     """Make the mesh; see `Surface.patch`."""
+    if surface.kind in ("circle", "line"):
+        raise InvalidInputError(f"a {surface.kind} has no area, and so no patch")
+    if not surface.radius_determined:
+        raise InvalidInputError(f"the radius of the {surface.kind} is not determined, and so it has no patch")
     offset = surface.center - surface.point
     points = member_points(surface, cloud) + offset
     chart = _chart(surface, points)

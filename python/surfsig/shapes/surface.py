@@ -288,7 +288,8 @@ class Surface:
         Raises
         ------
         InvalidInputError
-            If the cloud has fewer points than the surface was fitted to.
+            If the cloud has fewer points than the surface was fitted to, or it is a circle or a line, or its
+            radius is not determined.
         """
         return patch_of(self, PointCloud.of(cloud))
 
