@@ -17,7 +17,8 @@ from surfsig.recurrences.main_surface import may_be_equal
 from surfsig.recurrences.matching import common_shares
 from surfsig.recurrences.pieces import pieces_of
 from surfsig.recurrences.shadows import Region, direction_of_sensor, places_without_points, second_viewpoint
-from surfsig.shapes.surface import PARAMETERS, Kind, measured_surface
+from surfsig.shapes.measured import measured_surface
+from surfsig.shapes.surface import PARAMETERS, Kind
 from surfsig.spacing import point_spacing
 from surfsig.surfaces import Surface, Surfaces
 

@@ -13,7 +13,8 @@ from surface_points import Array
 import surfsig
 from surfsig import Surface, _surfsig, fit_cylinder, fit_plane, fit_sphere
 from surfsig.geometry import about, transform_points
-from surfsig.shapes.surface import CURVE_KINDS, KINDS, PARAMETERS, Kind, ShapeKind, measured_surface
+from surfsig.shapes.measured import measured_surface
+from surfsig.shapes.surface import CURVE_KINDS, KINDS, PARAMETERS, Kind, ShapeKind
 
 DRAWN: dict[str, Array] = {
     "sphere": sphere(np.random.default_rng(41), 0.2, 0.01),

@@ -10,7 +10,7 @@ from surface_points import UTM, rotation
 
 import surfsig
 from surfsig import InvalidInputError, PointCloud, Surfaces
-from surfsig.shapes.surface import measured_surface
+from surfsig.shapes.measured import measured_surface
 
 
 def agreement(found: Surfaces, owners: NDArray[np.intp]) -> float:

@@ -19,9 +19,10 @@ from surfsig.progress import ProgressCallback
 from surfsig.resolution import warn_if_surface_is_lost
 from surfsig.shapes.growth import grown
 from surfsig.shapes.known import Known, known_of
+from surfsig.shapes.measured import measured_surface
 from surfsig.shapes.minimum_zone import minimum_zone
 from surfsig.shapes.robust import fitted_to_inliers, variance_factor
-from surfsig.shapes.surface import CURVE_KINDS, ShapeKind, Surface, measured_surface
+from surfsig.shapes.surface import CURVE_KINDS, ShapeKind, Surface
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,8 @@ from surfsig.arguments import MOST_NEIGHBORS, positive_length, progress_callback
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud
 from surfsig.resolution import warn_if_surface_is_lost
-from surfsig.shapes.surface import KINDS, Kind, measured_surface
+from surfsig.shapes.measured import measured_surface
+from surfsig.shapes.surface import KINDS, Kind
 from surfsig.surfaces.classes import members_of
 from surfsig.surfaces.found import Surfaces
 

@@ -129,24 +129,22 @@ pub(super) fn polish(start: Primitive, points: &[Vector], conditions: &Condition
     let Some(mut linear) = Linear::of(&start, points, conditions) else {
         return start;
     };
-    let mut primitive = start;
+    let (mut primitive, (mut step, mut left)) = (start, linear.step());
     for _ in 0..MAX_POLISHING_STEPS {
-        let (step, left) = linear.step();
         // Points extend by 1: each distance is rounded by some epsilons, and each sum by one of its terms' lengths.
         if left <= f64::EPSILON * (4.0 + linear.sum().sqrt()) {
             break;
         }
+        let most = linear.sum() * (1.0 + ROUNDING_OF_SUM);
         let better = (0..=MAX_HALVINGS).find_map(|halving| {
             let moved =
                 primitive.chart().moved(&all_parameters(&(&step * 0.5_f64.powi(halving as i32)), &free));
-            let next = Linear::of(&moved, points, conditions)?;
-            let closer = next.step().1 < left && next.sum() <= linear.sum() * (1.0 + ROUNDING_OF_SUM);
-            closer.then_some((moved, next))
+            let next = Linear::of(&moved, points, conditions).filter(|next| next.sum() <= most)?;
+            let (next_step, next_left) = next.step();
+            (next_left < left).then_some((moved, next, next_step, next_left))
         });
-        match better {
-            Some((moved, next)) => (primitive, linear) = (moved, next),
-            None => break,
-        }
+        let Some(better) = better else { break };
+        (primitive, linear, step, left) = better;
     }
     primitive
 }

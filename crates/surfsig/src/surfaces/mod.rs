@@ -1,6 +1,6 @@
 //! Which parts of a scan are planes, spheres, cylinders, cones and tori.
 //!
-//! [`scene`] knows each point's neighbours, normal and noise; [`growth`] lets a [`crate::Primitive`] grow, [`merging`]
+//! [`scene`] knows each point's neighbours, normal and noise ([`surroundings`]); [`growth`] lets a [`crate::Primitive`] grow, [`merging`]
 //! joins what is one and shares out what lies between; [`unexplained`] looks again among the points that are left.
 
 mod graph;
@@ -8,6 +8,7 @@ mod growth;
 mod likeness;
 mod merging;
 mod scene;
+mod surroundings;
 mod unexplained;
 
 use crate::primitive::{SurfaceKind, Vector, uncertainty};
@@ -114,7 +115,7 @@ pub fn find_surfaces(
     monitor: &Monitor,
 ) -> Result<FoundSurfaces, Error> {
     with_threads(options.threads, || {
-        let Some(mut scene) = Scene::new(cloud, options.noise, LOCAL, monitor)? else {
+        let Some(mut scene) = Scene::new(cloud, options.noise, LOCAL, None, monitor)? else {
             return Ok(FoundSurfaces { labels: vec![NONE; cloud.len()], surfaces: Vec::new() });
         };
         let fewest =
@@ -122,7 +123,9 @@ pub fn find_surfaces(
         // The simplest first, in whatever order they were asked for.
         let wanted = |kind: &SurfaceKind| options.kinds.is_empty() || options.kinds.contains(kind);
         let kinds: Vec<SurfaceKind> = SurfaceKind::ALL.into_iter().filter(wanted).collect();
-        let mut regions = regions(&mut scene, &kinds, fewest, &LEVELS, monitor)?;
+        // Without noise neighbours do not err together.
+        let levels = if scene.is_exact { &LEVELS[..1] } else { &LEVELS[..] };
+        let mut regions = regions(&mut scene, &kinds, fewest, levels, monitor)?;
         let share_out = |scene: &mut Scene, regions: &mut Vec<Region>| {
             merging::merge(scene, regions);
             merging::assign(scene, regions);

@@ -1,15 +1,12 @@
 //! The points among which surfaces grow, and what is known about each.
 
-use super::graph::{Graph, NEIGHBOURS};
+use super::graph::Graph;
 use super::likeness::Likeness;
-use crate::extract::extract_within;
-use crate::fit::{FitKind, FitUsed};
+use super::surroundings::{Surroundings, around, is_line};
+use crate::fit::FitUsed;
 use crate::primitive::{Chart, Vector};
 use crate::statistics::upper_median;
-use crate::{
-    Error, ExtractOptions, Extraction, Monitor, Neighborhood, PointCloud, Queries, Radius,
-    voxel_representatives,
-};
+use crate::{Error, Extraction, Monitor, PointCloud, Queries, Radius, voxel_representatives};
 
 /// Nearest points to which a surface is fitted for a point's normal and noise.
 pub(super) const LOCAL: usize = 24;
@@ -21,15 +18,6 @@ pub(super) const FEW_LOCAL: usize = 12;
 /// more than half do, of tenths of them 4 to 43 in a hundred; of scans at most 12, where depth comes in steps or points
 /// in lines.
 const EXACT_SHARE: usize = 5;
-
-/// Linearity of the nearest points below which they extend to all sides alike.
-const EVEN: f64 = 0.5;
-
-/// Linearity of the nearest points from which they are a scanner's line, ...
-const LINE: f64 = 0.9;
-
-/// ... and so many times as many points are looked at.
-const ACROSS: u8 = 5;
 
 /// Distances that tell nothing, in typical distances between points.
 const FLOOR: f64 = 1e-4;
@@ -93,11 +81,12 @@ pub(super) struct Scene {
 
 impl Scene {
     /// `None` where there are too few points. Noise that somebody knows is that of every point; otherwise it is told by so
-    /// many neighbours.
+    /// many neighbours. Whether there is none is told by the points, too, unless it is known.
     pub fn new(
         cloud: &PointCloud<'_>,
         noise: Option<f64>,
         neighbours: usize,
+        is_exact: Option<bool>,
         monitor: &Monitor,
     ) -> Result<Option<Self>, Error> {
         let numbers: Vec<u32> =
@@ -133,7 +122,7 @@ impl Scene {
         };
         let chosen = scene.chosen.clone();
         scene.learn(&local, &chosen);
-        scene.is_exact = scene.is_without_noise(&is_even);
+        scene.is_exact = is_exact.unwrap_or_else(|| scene.is_without_noise(&is_even));
         if noise.is_none() && !scene.is_exact {
             scene.look_across_steps(monitor)?;
         }
@@ -204,8 +193,7 @@ impl Scene {
     ) -> Result<Option<Self>, Error> {
         let positions: Vec<[f64; 3]> =
             points.iter().map(|&point| self.points[point as usize].into()).collect();
-        let apart = Self::new(&PointCloud::new_f64(&positions), self.known, neighbours, monitor)?;
-        Ok(apart.map(|apart| Self { is_exact, ..apart }))
+        Self::new(&PointCloud::new_f64(&positions), self.known, neighbours, Some(is_exact), monitor)
     }
 
     pub fn is_noiseless(&self, noise: f64) -> bool {
@@ -334,59 +322,6 @@ impl Scene {
         let quarter = noise.len() / 4;
         self.likeness.spread * QUARTER * *noise.select_nth_unstable_by(quarter, f64::total_cmp).1
     }
-}
-
-/// What is around each of some points.
-struct Surroundings {
-    local: Extraction,
-    graph: Graph,
-    /// Typical distance to the last of the nearest points.
-    typical: f64,
-    /// Typical distance to the nearest one.
-    spacing: f64,
-    /// Whether the nearest points extend to all sides alike.
-    is_even: Vec<bool>,
-}
-
-impl Surroundings {
-    /// `None` where there are too few points, or all are one.
-    fn new(positions: &[[f64; 3]], neighbours: usize, monitor: &Monitor) -> Result<Option<Self>, Error> {
-        if positions.len() <= NEIGHBOURS.max(neighbours) {
-            return Ok(None);
-        }
-        let cloud = PointCloud::new_f64(positions);
-        let mut local = around(&cloud, neighbours, &Queries::All, &monitor.apart())?;
-        // On a line of a lidar the nearest points tell nothing across it.
-        let on_lines: Vec<u32> =
-            (0..positions.len() as u32).filter(|&i| is_line(&local, i as usize)).collect();
-        let is_even = local.linearity.iter().map(|&linearity| f64::from(linearity) < EVEN).collect();
-        let wider =
-            around(&cloud, neighbours * usize::from(ACROSS), &Queries::Indices(&on_lines), &monitor.apart())?;
-        local.take_over(on_lines.iter().map(|&i| i as usize).zip(0..), &wider);
-        let mut strides = vec![1_u8; positions.len()];
-        on_lines.iter().for_each(|&i| strides[i as usize] = ACROSS);
-        let typical = upper_median(local.radii.iter().map(|&r| f64::from(r)).filter(|r| *r > 0.0).collect());
-        let Some(typical) = typical else { return Ok(None) };
-        let graph = Graph::new(positions, &strides, Radius::new(typical)?, monitor)?;
-        let spacing =
-            upper_median(graph.nearest.iter().map(|&d| f64::from(d)).filter(|d| d.is_finite()).collect());
-        Ok(Some(Self { local, graph, typical, spacing: spacing.unwrap_or(0.0), is_even }))
-    }
-}
-
-/// Surfaces through so many nearest points; quadrics, for a paraboloid's bias would seem to be noise.
-fn around(
-    cloud: &PointCloud<'_>,
-    neighbours: usize,
-    queries: &Queries<'_>,
-    monitor: &Monitor,
-) -> Result<Extraction, Error> {
-    let options = ExtractOptions { fit: FitKind::Quadric, ..Default::default() };
-    extract_within(cloud, Neighborhood::Nearest(neighbours), queries, &options, monitor)
-}
-
-fn is_line(local: &Extraction, entry: usize) -> bool {
-    f64::from(local.linearity[entry]) > LINE
 }
 
 /// Which points have been seen; cleared in no time.

@@ -9,8 +9,11 @@ use super::scene::{FEW_LOCAL, LOCAL, NONE, Scene};
 use crate::primitive::SurfaceKind;
 use crate::{Error, Monitor};
 
-/// Passes over what is left, each with so many nearest points that tell noise and normals.
-const PASSES: [usize; 4] = [LOCAL, LOCAL, FEW_LOCAL, FEW_LOCAL];
+/// Nearest points that tell noise and normals among what is left.
+const NEIGHBOURS: [usize; 2] = [LOCAL, FEW_LOCAL];
+
+/// Passes with each, as long as they find something.
+const PASSES: usize = 2;
 
 /// One point in so many that exact surfaces leave is enough for measured points among exact ones.
 const MEASURED_SHARE: usize = 4;
@@ -29,14 +32,16 @@ pub(super) fn add(
     }
     let before = regions.len();
     let measured = scene.chosen.len().div_ceil(MEASURED_SHARE).max(fewest);
-    let mut add_among_left = |neighbours: usize, least: usize, is_exact: bool| -> Result<(), Error> {
+    let mut add_among_left = |neighbours: usize, least: usize, is_exact: bool| -> Result<bool, Error> {
         let is_left = |&point: &u32| scene.labels[point as usize] == NONE;
         let left: Vec<u32> = scene.chosen.iter().copied().filter(is_left).collect();
         if left.len() < least {
-            return Ok(());
+            return Ok(false);
         }
-        let Some(mut apart) = scene.apart(&left, neighbours, is_exact, monitor)? else { return Ok(()) };
-        for mut region in super::regions(&mut apart, kinds, fewest, &[neighbours], monitor)? {
+        let Some(mut apart) = scene.apart(&left, neighbours, is_exact, monitor)? else { return Ok(false) };
+        let found = super::regions(&mut apart, kinds, fewest, &[neighbours], monitor)?;
+        let is_any = !found.is_empty();
+        for mut region in found {
             region.primitive.point += apart.origin;
             for member in &mut region.members {
                 let own = *member as usize;
@@ -48,10 +53,11 @@ pub(super) fn add(
             }
             regions.push(region);
         }
-        Ok(())
+        Ok(is_any)
     };
-    for neighbours in PASSES {
-        add_among_left(neighbours, fewest, true)?;
+    for neighbours in NEIGHBOURS {
+        let mut passes = 0..PASSES;
+        while passes.next().is_some() && add_among_left(neighbours, fewest, true)? {}
     }
     add_among_left(LOCAL, measured, false)?;
     Ok(regions.len() > before)
