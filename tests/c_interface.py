@@ -177,8 +177,8 @@ class CInterface:
         self.functions = f = ctypes.CDLL(str(self.library))
         for name in ("version", "last_error", "status_name", "surface_kind_name", "scan_status_name"):
             getattr(f, f"surfsig_{name}").restype = c_char_p
-        for name in ("options", "surface_options", "registration_options", "find_options"):
-            getattr(f, f"surfsig_{name}_new").restype = c_void_p
+        for name in ("", "surface_", "primitive_", "registration_", "find_"):
+            getattr(f, f"surfsig_{name}options_new").restype = c_void_p
         sized = ("cloud", "extraction", "surfaces", "odometry", "model", "instances")
         sizes = tuple(f"{name}_size" for name in sized)
         for name in (*sizes, "surfaces_label_count", "surface_kind_parameters"):

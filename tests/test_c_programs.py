@@ -79,6 +79,10 @@ int main() {
   std::printf("%zu %zu %.1f %zu %.1f %zu\\n", floor.size(), floor.covariance(0).size(), again.axis()[2],
               plane.uncertainty(cloud).covariance.size(), plane.distances(cloud)[7],
               floor.covariance(1).size());
+  surfsig::PrimitiveOptions known;
+  known.axis({{0.0, 0.0, 3.0}}).start(plane).weights(std::vector<double>(cloud.size(), 2.0)).radius(0.0);
+  const auto kept = surfsig::fit_primitive(cloud, SURFSIG_SURFACE_KIND_PLANE, known);
+  std::printf("%.1f %.1f\\n", kept.axis()[2], kept.uncertainty(cloud, known).covariance[4]);
   surfsig::Moments moments(cloud, {{1.5, 1.5, 3.0}});
   try {
     (moments += moments).sphere();
@@ -129,7 +133,7 @@ def lattice_points_within(steps: float) -> int:
 
 @pytest.mark.parametrize("standard", ["c++14", "c++20"])
 def test_a_program_in_cpp(installed: Path, tmp_path: Path, standard: str) -> None:
-    one, none, refused, counts, own, thrown, plane, flat, moved, back = output_of(
+    one, none, refused, counts, own, thrown, plane, kept, flat, moved, back = output_of(
         tmp_path / "main.cpp", IN_CPP, installed, "c++", standard
     )
     assert one == f"1 {lattice_points_within(5.5)} 1.000"
@@ -139,6 +143,7 @@ def test_a_program_in_cpp(installed: Path, tmp_path: Path, standard: str) -> Non
     assert own == "-1.0 1 0 0"
     assert thrown == "thrown by the caller"
     assert plane == "1 9 1.0 9 0.0 0"
+    assert kept == "1.0 0.0"
     assert flat == "1 the points determine no sphere"
     # A quarter turn about z and a translation, twice.
     assert moved == "-2 3 6, 1 0 0, 1"

@@ -164,6 +164,77 @@ def test_fits(c: CInterface, kind: str) -> None:
         np.testing.assert_array_equal(own, other)
 
 
+@contextmanager
+def known(c: CInterface, **values: Any) -> Iterator[c_void_p]:
+    """Make options of a fit."""
+    f = c.functions
+    options = c_void_p(f.surfsig_primitive_options_new())
+    try:
+        if "weights" in values:
+            weights = values["weights"]
+            c.check(
+                f.surfsig_primitive_options_set_weights(options, address(weights), c_size_t(len(weights)))
+            )
+        if "radius" in values:
+            c.check(f.surfsig_primitive_options_set_radius(options, c_double(values["radius"])))
+        if "axis" in values:
+            c.check(f.surfsig_primitive_options_set_axis(options, (c_double * 3)(*values["axis"])))
+        yield options
+    finally:
+        f.surfsig_primitive_options_free(options)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values"),
+    [
+        ("sphere", {"radius": 0.31}),
+        ("cylinder", {"radius": 0.2, "axis": [0.0, 0.0, 1.0]}),
+        ("cone", {"axis": [0.0, 0.0, 2.0], "weighted": True}),
+        ("plane", {"weighted": True}),
+    ],
+)
+def test_fits_where_something_is_known(c: CInterface, kind: str, values: dict[str, Any]) -> None:
+    points, f = points_of(kind), c.functions
+    given = {name: value for name, value in values.items() if name != "weighted"}
+    if "weighted" in values:
+        given["weights"] = np.random.default_rng(9).integers(0, 3, len(points)).astype(np.float64)
+    arguments = (given.get("weights"), given.get("radius"), given.get("axis"))
+    expected = _surfsig.fit_primitive(points, kind, None, *arguments)
+    assert expected is not None
+    made, number = c_void_p(1), c_uint8(KINDS.index(kind))
+    parameters = f.surfsig_surface_kind_parameters(number)
+    covariance = np.full((parameters, parameters), 7.0)
+    with known(c, **given) as options, c.cloud_of(points) as cloud:
+        c.check(f.surfsig_fit_primitive_with(cloud, number, options, byref(made)))
+        c.check(
+            f.surfsig_primitive_uncertainty_with(
+                made, cloud, options, address(covariance), c_void_p(), c_void_p()
+            )
+        )
+        point = np.ctypeslib.as_array(f.surfsig_primitive_point(made), (3,)).copy()
+        radius = f.surfsig_primitive_radius(made)
+        f.surfsig_primitive_free(made)
+    np.testing.assert_array_equal(point, expected.point)
+    np.testing.assert_array_equal(radius, expected.radius)
+    np.testing.assert_array_equal(covariance, expected.uncertainty(points, *arguments)[0])
+
+
+def test_what_is_known_must_suit_the_kind_and_the_points(c: CInterface) -> None:
+    points, made = points_of("cone"), c_void_p(1)
+    wrong = {
+        "a cone keeps no radius": {"radius": 1.0},
+        "weights must be one of each of the 6000 points, not 2": {"weights": np.ones(2)},
+    }
+    for message, values in wrong.items():
+        with known(c, **values) as options, c.cloud_of(points) as cloud:
+            code = c.functions.surfsig_fit_primitive_with(
+                cloud, c_uint8(KINDS.index("cone")), options, byref(made)
+            )
+            with pytest.raises(Failed, match=message):
+                c.check(code)
+            assert not made
+
+
 def test_a_fit_of_points_with_an_origin_is_elsewhere(c: CInterface) -> None:
     points = points_of("sphere")
     with fitted(c, points, "sphere") as here, fitted(c, points, "sphere", origin=UTM) as there:

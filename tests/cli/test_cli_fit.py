@@ -139,3 +139,19 @@ def test_what_is_wrong_is_one_line(
     assert finished.err.startswith("surfsig: error: ")
     assert finished.err.count("\n") == 1
     assert message in finished.err
+
+
+def test_a_field_gives_the_weights(shell: Callable[..., Any], tmp_path: Path) -> None:
+    rng = np.random.default_rng(32)
+    points = np.column_stack([rng.uniform(-1, 1, (60, 2)), 0.01 * rng.normal(size=60)])
+    weights = rng.uniform(0, 2, 60).astype(np.float32)
+    path = tmp_path / "plate.ply"
+    surfsig.write(path, PointCloud(points, fields={"trust": weights}))
+    values = json.loads(shell("fit", "plane", path, "--weights", "trust", "--json").out)
+    expected = surfsig.fit_plane(surfsig.read(path), weights=weights)
+    np.testing.assert_array_equal(values["axis"], expected.axis)
+    assert values["deviation"] == expected.deviation
+    assert values["axis"] != json.loads(shell("fit", "plane", path, "--json").out)["axis"]
+    finished = shell("fit", "plane", path, "--weights", "faith")
+    assert finished.code != 0
+    assert "no field is called 'faith': there are trust" in finished.err

@@ -58,11 +58,15 @@ def components(kind: str, points: Array, position: Array, axis: Array, sizes: Ar
     return beside.ravel()
 
 
-def reference(kind: str, points: Array, weights: Array | None = None, fixed: str = "") -> tuple[Array, float]:
-    """Give distances of the least squares from the true shape, to the last digits, and its first size."""
+Parts = tuple[Array, Array, Array]
+"""A position on the plane or axis (of a curve or sphere its center), a direction, and the sizes."""
+
+
+def reference_shape(kind: str, points: Array, weights: Array | None = None, fixed: str = "") -> Parts:
+    """Find the least squares from the true shape on, to the last digits, by a general solver."""
     sizes = np.array(SIZES[kind])
 
-    def parts(x: Array) -> tuple[Array, Array, Array]:
+    def parts(x: Array) -> Parts:
         axis = np.array([0.0, 0, 1]) if fixed == "axis" else np.array([x[3], x[4], 1.0])
         return x[:3], axis, sizes if fixed == "radius" else x[5:]
 
@@ -76,7 +80,13 @@ def reference(kind: str, points: Array, weights: Array | None = None, fixed: str
 
     start = np.concatenate([np.zeros(5), sizes])
     found = least_squares(residuals, start, jac="3-point", xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=300)
-    return components(kind, points, *parts(found.x)), float(found.x[5]) if len(sizes) else math.nan
+    return parts(found.x)
+
+
+def reference(kind: str, points: Array, weights: Array | None = None, fixed: str = "") -> tuple[Array, float]:
+    """Give distances of the least squares, and its first size."""
+    position, axis, sizes = reference_shape(kind, points, weights, fixed)
+    return components(kind, points, position, axis, sizes), float(sizes[0]) if len(sizes) else math.nan
 
 
 def sums(values: Array) -> float:
@@ -114,6 +124,71 @@ def test_a_fit_moves_with_the_points(kind: str, unit: float) -> None:
         assert np.linalg.norm(np.cross(there.axis, turned @ here.axis)) < 1e-7
     assert there.deviation / unit == pytest.approx(here.deviation, rel=1e-6)
     assert there.form_error / unit == pytest.approx(here.form_error, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", FITS)
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e3])
+@pytest.mark.parametrize("count", [8, 40])
+def test_parameters_are_those_of_the_reference(kind: str, unit: float, count: int) -> None:
+    """Of few points, 1e6 times the size away, in micrometres and kilometres: to 1e-7, as metrologists ask."""
+    rng = np.random.default_rng(60)
+    points = revolved(rng, kind, SIZES[kind], count, arc=3.5, noise=0.001)
+    position, axis, sizes = reference_shape(kind, points)
+    turned, away = rotation(rng), unit * np.array([1e6, -5e5, 3e5])
+    scan = unit * points @ turned.T + away
+    surface = FITS[kind](scan)
+    found = (
+        surface.fitted_radius / unit,
+        surface.half_angle if kind == "cone" else surface.major_radius / unit,
+    )
+    direction = turned @ axis / np.linalg.norm(axis)
+    if kind == "cone":
+        # The reference's radius is that at its own position.
+        beside = turned @ position + away / unit - surface.point / unit
+        found = (found[0] + float(beside @ direction) * math.tan(found[1]), found[1])
+    for value, expected in zip(found, sizes, strict=False):
+        assert value == pytest.approx(expected, rel=1e-7)
+    if kind != "sphere":
+        assert np.linalg.norm(np.cross(surface.axis, direction)) < 1e-7
+    if kind in ("sphere", "torus", "circle"):
+        np.testing.assert_allclose((surface.center - away) / unit, turned @ position, atol=1e-7)
+    expected_distances = components(kind, points, position, axis, sizes)
+    if kind in ("circle", "line"):
+        shape = (2, count) if kind == "circle" else (count, 3)
+        expected_distances = np.linalg.norm(
+            expected_distances.reshape(shape), axis=0 if kind == "circle" else 1
+        )
+    signs = 1.0 if kind != "plane" else math.copysign(1, float(surface.axis @ direction))
+    np.testing.assert_allclose(signs * surface.distances(scan) / unit, expected_distances, atol=1e-7)
+
+
+@pytest.mark.parametrize("kind", FITS)
+def test_many_points_have_the_least_squares_of_all(kind: str) -> None:
+    """Most steps are made with a sample; the last ones are not."""
+    points = revolved(np.random.default_rng(61), kind, SIZES[kind], 20_000, arc=2.5, noise=0.01)
+    surface = FITS[kind](points)
+    expected, _ = reference(kind, points)
+    squares = surface.distances(points) ** 2
+    assert squares.sum() == pytest.approx(sums(expected), rel=1e-12)
+    # Half of the points are given twice, which is a weight of two.
+    weights = np.where(np.arange(20_000) % 2, 2.0, 1.0)
+    weighted = FITS[kind](points, weights=weights)
+    repeated = FITS[kind](np.concatenate([points, points[1::2]]))
+    np.testing.assert_allclose(weighted.distances(points), repeated.distances(points), atol=1e-9)
+
+
+def test_points_without_weight_are_not_looked_at() -> None:
+    """Far away, and a thousand times as many as the others."""
+    rng = np.random.default_rng(62)
+    points = revolved(rng, "sphere", (1.0,), 30, arc=6.0, noise=0.001)
+    far = rng.normal(scale=100, size=(30_000, 3))
+    weights = np.repeat([1.0, 0.0], [len(points), len(far)])
+    alone, among = (
+        surfsig.fit_sphere(points),
+        surfsig.fit_sphere(np.concatenate([points, far]), weights=weights),
+    )
+    assert among.radius == alone.radius
+    np.testing.assert_allclose(among.covariance, alone.covariance, rtol=1e-12)
 
 
 @pytest.mark.parametrize("kind", FITS)

@@ -314,6 +314,36 @@ inline Surfaces find_surfaces(const Cloud &cloud, const SurfaceOptions &options 
   return Surfaces(made);
 }
 
+class Primitive;
+
+/** What is known of a surface before fit_primitive() fits it; everything is fitted unless it is set. */
+class PrimitiveOptions {
+public:
+  /** A surface of the same kind near the points, from which the fit begins. */
+  PrimitiveOptions &start(const Primitive &start);
+  /** By how much the squared distance of each point counts. */
+  PrimitiveOptions &weights(const std::vector<double> &weights) {
+    return checked(surfsig_primitive_options_set_weights(handle_.get(), weights.data(), weights.size()));
+  }
+  /** Of a sphere, cylinder or circle. */
+  PrimitiveOptions &radius(double radius) {
+    return checked(surfsig_primitive_options_set_radius(handle_.get(), radius));
+  }
+  /** Of the axis or normal, of any length. */
+  PrimitiveOptions &axis(const Vector &axis) {
+    return checked(surfsig_primitive_options_set_axis(handle_.get(), axis.data()));
+  }
+  const surfsig_primitive_options *get() const { return handle_.get(); }
+
+private:
+  PrimitiveOptions &checked(surfsig_code code) {
+    check(code);
+    return *this;
+  }
+  detail::Handle<surfsig_primitive_options, surfsig_primitive_options_free> handle_{
+      surfsig_primitive_options_new()};
+};
+
 /** How sure a surface's parameters are. */
 struct Uncertainty {
   /** p x p, row by row, with p and the parameters as surfsig_surface_kind_parameters() says. */
@@ -339,11 +369,12 @@ public:
     check(surfsig_primitive_distances(get(), cloud.get(), distances.data()));
     return distances;
   }
-  Uncertainty uncertainty(const Cloud &cloud) const {
+  /** With the options of the fit. */
+  Uncertainty uncertainty(const Cloud &cloud, const PrimitiveOptions &options = PrimitiveOptions()) const {
     const std::size_t parameters = surfsig_surface_kind_parameters(kind());
     Uncertainty found{std::vector<double>(parameters * parameters), {}, 0.0};
-    check(surfsig_primitive_uncertainty(get(), cloud.get(), found.covariance.data(), found.across[0].data(),
-                                        &found.freedom));
+    check(surfsig_primitive_uncertainty_with(get(), cloud.get(), options.get(), found.covariance.data(),
+                                             found.across[0].data(), &found.freedom));
     return found;
   }
   double independent_error(const Cloud &cloud) const {
@@ -362,6 +393,18 @@ inline Primitive fit_primitive(const Cloud &cloud, surfsig_surface_kind kind,
   surfsig_primitive *made = nullptr;
   check(surfsig_fit_primitive(cloud.get(), kind, start != nullptr ? start->get() : nullptr, &made));
   return Primitive(made);
+}
+
+/** The same where something is known, or points do not count alike. */
+inline Primitive fit_primitive(const Cloud &cloud, surfsig_surface_kind kind,
+                               const PrimitiveOptions &options) {
+  surfsig_primitive *made = nullptr;
+  check(surfsig_fit_primitive_with(cloud.get(), kind, options.get(), &made));
+  return Primitive(made);
+}
+
+inline PrimitiveOptions &PrimitiveOptions::start(const Primitive &start) {
+  return checked(surfsig_primitive_options_set_start(handle_.get(), start.get()));
 }
 
 /** Sums over points, about a centre near them, off which surfaces are read. Those of two sets add. */

@@ -4,7 +4,8 @@ use crate::arrays::{present, put, put_new, room};
 use crate::cloud::{given, surfsig_cloud};
 use crate::code::{Failure, guarded, surfsig_code};
 use crate::kind::{kind_of, surfsig_surface_kind};
-use surfsig::{Primitive, SurfaceKind, fit_primitive};
+use crate::primitive_options::{surfsig_primitive_options, surfsig_primitive_options_set_start};
+use surfsig::{Primitive, SurfaceKind, fit_primitive_with};
 
 /// A plane, sphere, cylinder, cone or torus without a boundary, a circle or a line. Made by surfsig_fit_primitive(),
 /// freed by surfsig_primitive_free(). It refers to nothing of the caller's.
@@ -12,6 +13,12 @@ pub struct surfsig_primitive {
     fitted: Primitive,
     point: [f64; 3],
     axis: [f64; 3],
+}
+
+impl surfsig_primitive {
+    pub(crate) fn fitted(&self) -> Primitive {
+        self.fitted
+    }
 }
 
 /// Fits a surface to points: the sum of squared orthogonal distances is least.
@@ -31,13 +38,33 @@ pub unsafe extern "C" fn surfsig_fit_primitive(
     start: Option<&surfsig_primitive>,
     primitive: *mut *mut surfsig_primitive,
 ) -> surfsig_code {
+    let mut options = surfsig_primitive_options::default();
+    surfsig_primitive_options_set_start(Some(&mut options), start);
+    // SAFETY: the conditions are the same.
+    unsafe { surfsig_fit_primitive_with(cloud, kind, Some(&options), primitive) }
+}
+
+/// Fits a surface of which something is known, or to points that do not count alike: the sum of weighted squared
+/// orthogonal distances is least.
+///
+/// SURFSIG_CODE_UNDETERMINED as for surfsig_fit_primitive(); points without weight do not count.
+///
+/// @param cloud The points.
+/// @param kind A surfsig_surface_kind; any other number is SURFSIG_CODE_INVALID_INPUT.
+/// @param options What is known; null for nothing.
+/// @param primitive Where the result is put; null is put there where the call fails.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn surfsig_fit_primitive_with(
+    cloud: Option<&surfsig_cloud>,
+    kind: u8,
+    options: Option<&surfsig_primitive_options>,
+    primitive: *mut *mut surfsig_primitive,
+) -> surfsig_code {
     let made = || {
         let (cloud, kind) = (given(cloud)?, kind_of(kind)?);
-        let start = start.map(|start| &start.fitted);
-        if start.is_some_and(|start| start.kind() != kind) {
-            return Err(Failure::invalid_input(format!("start must be a {} too", kind.name())));
-        }
-        let fitted = fit_primitive(&cloud.positions(), kind, start)
+        let (positions, nothing) = (cloud.positions(), surfsig_primitive_options::default());
+        let options = options.unwrap_or(&nothing).of(kind, positions.len())?;
+        let fitted = fit_primitive_with(&positions, kind, &options)
             .ok_or_else(|| Failure::undetermined(kind.name()))?;
         Ok(surfsig_primitive { fitted, point: fitted.point(), axis: fitted.axis() })
     };
@@ -137,9 +164,32 @@ pub unsafe extern "C" fn surfsig_primitive_uncertainty(
     across: *mut f64,
     freedom: *mut f64,
 ) -> surfsig_code {
+    // SAFETY: the conditions are the same.
+    unsafe { surfsig_primitive_uncertainty_with(primitive, cloud, None, covariance, across, freedom) }
+}
+
+/// The same of a surface that surfsig_fit_primitive_with() fitted: what it kept has no variance and no covariance.
+///
+/// @param primitive The surface.
+/// @param cloud The points that it was fitted to.
+/// @param options Those of the fit; null for none. The start means nothing here.
+/// @param covariance As for surfsig_primitive_uncertainty().
+/// @param across As for surfsig_primitive_uncertainty().
+/// @param freedom As for surfsig_primitive_uncertainty().
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn surfsig_primitive_uncertainty_with(
+    primitive: Option<&surfsig_primitive>,
+    cloud: Option<&surfsig_cloud>,
+    options: Option<&surfsig_primitive_options>,
+    covariance: *mut f64,
+    across: *mut f64,
+    freedom: *mut f64,
+) -> surfsig_code {
     guarded(|| {
         let primitive = present(primitive, "primitive")?;
-        let found = primitive.fitted.uncertainty(&given(cloud)?.positions());
+        let (positions, nothing) = (given(cloud)?.positions(), surfsig_primitive_options::default());
+        let options = options.unwrap_or(&nothing).of(primitive.fitted.kind(), positions.len())?;
+        let found = primitive.fitted.uncertainty_with(&positions, &options);
         // SAFETY: the caller gives room for the rows of the covariance.
         let room = unsafe { room(covariance, found.covariance.len(), "covariance") }?;
         room.copy_from_slice(&found.covariance);

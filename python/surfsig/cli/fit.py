@@ -14,7 +14,9 @@ from surfsig.defaults import INTERVAL
 from surfsig.digits import rounded, with_error
 
 if TYPE_CHECKING:
-    from surfsig import Surface
+    from numpy.typing import NDArray
+
+    from surfsig import PointCloud, Surface
 
 
 @click.group("fit", no_args_is_help=True)
@@ -28,6 +30,7 @@ def fit_command() -> None:
       surfsig fit cylinder scan.ply --near 0,0.1,0.7 --radius 0.03 --json | jq .interval
       surfsig fit cylinder pipe.ply --radius 0.03 --axis 0,0,1   what is known is kept
       surfsig fit plane plate.ply --criterion minimum_zone --json | jq .form_error
+      surfsig fit line edge.las --weights intensity          the file's field says how much each point counts
     """  # noqa: D301
 
 
@@ -69,6 +72,11 @@ def _shape_command(name: str, text: str) -> click.Command:
         help="With --near: of the ball to begin with, about the object's size.  [default: by the points]  "
         "Without: the radius that a sphere, cylinder or circle has, where it is known.",
     )
+    @click.option(
+        "--weights",
+        metavar="FIELD",
+        help="The file's field that says by how much each point's squared distance counts.  [default: alike]",
+    )
     @click.option("--robust", is_flag=True, help="Leave out points that are far from the surface.")
     @input_options
     @threads_option
@@ -77,6 +85,7 @@ def _shape_command(name: str, text: str) -> click.Command:
         file: Path,
         near: tuple[float, float, float] | None,
         radius: float | None,
+        weights: str | None,
         robust: bool,
         threads: int | None,
         as_json: bool,
@@ -97,6 +106,7 @@ def _shape_command(name: str, text: str) -> click.Command:
                     cloud,
                     near=near,
                     radius=radius,
+                    weights=None if weights is None else _field(cloud, weights),
                     robust=robust,
                     threads=threads,
                     progress=progress,
@@ -114,6 +124,16 @@ def _shape_command(name: str, text: str) -> click.Command:
     if "criterion" in taken:
         command = _CRITERION(command)
     return click.command(name, help=text, no_args_is_help=True)(command)
+
+
+def _field(cloud: PointCloud, name: str) -> NDArray[Any]:
+    """Give a field of the file, or name those that there are."""
+    from surfsig import InvalidInputError
+
+    if name not in cloud.fields:
+        names = ", ".join(cloud.fields) or "none"
+        raise InvalidInputError(f"no field is called {name!r:.40}: there are {names}")
+    return cloud.fields[name]
 
 
 def _rows(surface: Surface, points: int) -> list[tuple[str, str]]:

@@ -39,9 +39,9 @@ def covered_area(placement: Placement, points: Array) -> float:
     if not side > _FINEST * float(np.ptp(flat, axis=0).max()):
         return math.nan
     # By half a cell the lowest points are inside of theirs, so that these are half covered, too.
-    cells = np.unique(np.floor((flat - flat.min(axis=0)) / side + 0.5).astype(np.int64), axis=0)
+    cells = np.floor((flat - flat.min(axis=0)) / side + 0.5).astype(np.int64)
     rows = cells[:, 0].max() + 3
-    numbers = cells[:, 0] + 1 + rows * (cells[:, 1] + 1)
+    numbers = np.unique(cells[:, 0] + 1 + rows * (cells[:, 1] + 1))
     inner = np.ones(len(numbers), np.bool_)
     for step in (-1, 1, -rows, rows):
         inner &= np.isin(numbers + step, numbers)

@@ -51,7 +51,7 @@ def fitted_to_inliers(
     if surface is None:
         return None
     inliers = np.ones(len(points), np.bool_)
-    rounding = rounding_of(points)
+    rounding = rounding_of(points) if robust else 0.0
     for _ in range(passes):
         distances = surface.distances(points)
         chosen = near(distances, distances, rounding)

@@ -114,12 +114,14 @@ class Surface:
     area: float
     """Of the part of it that has points, as an estimate."""
     members: NDArray[np.intp]
-    """The numbers of the points that it was fitted to, (m,), ascending."""
+    """The numbers of the points that it was fitted to, (m,), ascending; of a surface of `find_surfaces` all of
+    its points, also those at its borders, which it was not fitted to."""
     rms: float
     """Root mean square of the members' distances."""
     deviation: float
     """The same, corrected for the parameters: the standard deviation of a point's distance, with `weights`
-    that of a point with the largest weight. Of a curve, of each of the two components of a distance."""
+    that of a point with the largest weight. Of a curve, of each of the two components of a distance. Of a
+    surface of `find_surfaces`, that of the points that it was fitted to."""
     form_error: float
     """Peak to valley of the members' signed distances: flatness, roundness, cylindricity. Of a circle, of
     their distances from its axis; of a line twice the largest distance (straightness)."""

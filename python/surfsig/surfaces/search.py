@@ -33,6 +33,11 @@ def find_surfaces(
     them; the simplest kind that explains its points wins. Nothing needs to be set, and nothing is left to
     chance: the result is always the same.
 
+    At last each surface is fitted again as `surfsig.fit_sphere` and its like do, without a strip along its
+    borders with others: there points of both lie within the noise, and bend the surface by more than its
+    standard error. Where noise hides the sagitta of an arc, the radius is not determined: it is NaN,
+    `radius_determined` is false, and the interval has no upper end.
+
     Parameters
     ----------
     cloud
@@ -80,7 +85,9 @@ def find_surfaces(
     )
     members = members_of(labels, len(entries))
     found = [
-        measured_surface(entry, scan.offsets[chosen].astype(np.float64), scan.origin, chosen)
+        measured_surface(
+            {**entry, "checked": True}, scan.offsets[chosen].astype(np.float64), scan.origin, chosen
+        )
         for entry, chosen in zip(entries, members, strict=True)
     ]
     return Surfaces(scan, labels, found, noise, threads)

@@ -37,6 +37,7 @@ pub fn primitives(called: &mut Called) {
     call!(called, surfsig_primitive_uncertainty(primitive, cloud.get(), room, none, none) gives OK);
     assert!(call!(called, surfsig_primitive_independent_error(None, cloud.get())).is_nan());
     assert!(call!(called, surfsig_primitive_independent_error(primitive, None)).is_nan());
+    primitive_options(called, &cloud, primitive);
     call!(called, surfsig_primitive_free(owned(made)));
     call!(called, surfsig_primitive_free(None));
     call!(called, surfsig_primitive_kind(None));
@@ -44,6 +45,51 @@ pub fn primitives(called: &mut Called) {
     assert!(call!(called, surfsig_primitive_radius(None)).is_nan());
     assert!(call!(called, surfsig_primitive_major_radius(None)).is_nan());
     assert!(call!(called, surfsig_primitive_half_angle(None)).is_nan());
+}
+
+/// Of a fit of a sphere to a cloud.
+fn primitive_options(called: &mut Called, cloud: &Cloud, sphere: Option<&surfsig_primitive>) {
+    let (mut made, mut numbers): (*mut surfsig_primitive, _) = (null_mut(), [0.0; 400]);
+    let (out, room, none) = (&raw mut made, numbers.as_mut_ptr(), null_mut());
+    call!(called, surfsig_primitive_options_set_start(None, sphere) gives INVALID);
+    call!(called, surfsig_primitive_options_set_weights(None, null(), 0) gives INVALID);
+    call!(called, surfsig_primitive_options_set_radius(None, 1.0) gives INVALID);
+    call!(called, surfsig_primitive_options_set_axis(None, null()) gives INVALID);
+    call!(called, surfsig_primitive_options_free(None));
+    let mut options = call!(called, surfsig_primitive_options_new());
+    for number in [-1.0, f64::NAN, f64::INFINITY] {
+        call!(called, surfsig_primitive_options_set_radius(Some(&mut options), number) gives INVALID);
+        call!(called, surfsig_primitive_options_set_weights(Some(&mut options), &number, 1) gives INVALID);
+    }
+    for count in HUGE {
+        call!(called, surfsig_primitive_options_set_weights(Some(&mut options), room, count) gives INVALID);
+    }
+    call!(called, surfsig_primitive_options_set_axis(Some(&mut options), BAD.as_ptr()) gives INVALID);
+    call!(called, surfsig_primitive_options_set_axis(Some(&mut options), [0.0; 3].as_ptr()) gives INVALID);
+    call!(called, surfsig_fit_primitive_with(None, 1, Some(&options), out) gives INVALID);
+    call!(called, surfsig_fit_primitive_with(cloud.get(), 7, Some(&options), out) gives INVALID);
+    call!(called, surfsig_fit_primitive_with(cloud.get(), 1, Some(&options), null_mut()) gives INVALID);
+    let weights = [1.0; 3];
+    call!(called, surfsig_primitive_options_set_weights(Some(&mut options), weights.as_ptr(), 3) gives OK);
+    call!(called, surfsig_fit_primitive_with(cloud.get(), 1, Some(&options), out) gives INVALID);
+    call!(called, surfsig_primitive_options_set_weights(Some(&mut options), null(), 0) gives OK);
+    call!(called, surfsig_primitive_options_set_start(Some(&mut options), sphere) gives OK);
+    call!(called, surfsig_fit_primitive_with(cloud.get(), 2, Some(&options), out) gives INVALID);
+    call!(called, surfsig_primitive_options_set_start(Some(&mut options), None) gives OK);
+    call!(called, surfsig_primitive_options_set_radius(Some(&mut options), 2.0) gives OK);
+    call!(called, surfsig_fit_primitive_with(cloud.get(), 0, Some(&options), out) gives INVALID);
+    call!(called, surfsig_fit_primitive_with(cloud.get(), 1, Some(&options), out) gives OK);
+    assert_eq!(call!(called, surfsig_primitive_radius(unsafe { made.as_ref() })), 2.0);
+    let fitted = unsafe { made.as_ref() };
+    call!(called, surfsig_primitive_uncertainty_with(None, cloud.get(), Some(&options), room, none, none) gives INVALID);
+    call!(called, surfsig_primitive_uncertainty_with(fitted, None, Some(&options), room, none, none) gives INVALID);
+    call!(called, surfsig_primitive_uncertainty_with(fitted, cloud.get(), Some(&options), none, none, none) gives INVALID);
+    call!(called, surfsig_primitive_uncertainty_with(fitted, cloud.get(), Some(&options), room, none, none) gives OK);
+    assert_eq!(numbers[15], 0.0);
+    call!(called, surfsig_primitive_options_set_axis(Some(&mut options), [0.0, 0.0, 1e200].as_ptr()) gives OK);
+    call!(called, surfsig_fit_primitive_with(cloud.get(), 1, Some(&options), out) gives INVALID);
+    surfsig_primitive_free(owned(made));
+    call!(called, surfsig_primitive_options_free(Some(options)));
 }
 
 pub fn moments(called: &mut Called) {

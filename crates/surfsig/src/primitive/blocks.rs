@@ -2,58 +2,159 @@
 
 use super::geometry::Vector;
 
-/// Blocks that points may be cut into; of 32 a standard error is itself known to some 15 %.
-const BLOCKS: [usize; 3] = [8, 16, 32];
+/// Fewest blocks that points are cut into, and most; of 32 a standard error is itself known to some 15 %.
+const FEWEST: usize = 8;
+const MOST: usize = 32;
 
 /// Independent pieces that a block should hold at least, so that few of them lie across its border.
 const PIECES: f64 = 6.0;
 
-/// How many blocks to cut points into, 8 to 32: fewer, the more alike neighbours err.
-pub(super) fn block_count(points: &[Vector], residuals: &[f64]) -> usize {
-    let [fewest, .., most] = BLOCKS;
-    let largest = BLOCKS.map(|count| design_effect(points, residuals, count)).into_iter().fold(1.0, f64::max);
-    ((points.len() as f64 / largest / PIECES) as usize).clamp(fewest, most)
+/// Most blocks by which what neighbours have in common is measured, ...
+const MOST_SMALL: usize = 256;
+
+/// ... and fewest points in one.
+const FEWEST_POINTS: usize = 2;
+
+/// A variance grows at most so many times by what crosses the borders of blocks: more is told by too few blocks.
+const MOST_CROSSING: f64 = 3.0;
+
+/// Points cut into blocks of neighbours, of which only whole ones count as independent.
+pub(super) struct Blocks {
+    /// The number of each point's block.
+    pub labels: Vec<usize>,
+    /// How many times as large a variance is as these blocks tell, by what points on either side of their borders have in
+    /// common.
+    pub crossing: f64,
+}
+
+impl Blocks {
+    /// 8 to 32 blocks, fewer, the more alike neighbours err, of the residuals that so many parameters leave.
+    pub fn of_residuals(points: &[Vector], residuals: &[f64], parameters: usize) -> Self {
+        let count = points.len();
+        if count < MOST {
+            return Self { labels: spatial_blocks(points, FEWEST), crossing: 1.0 };
+        }
+        let enough = |&blocks: &usize| blocks * FEWEST_POINTS <= count;
+        let smallest = doubled(MOST, MOST_SMALL).filter(enough).last().unwrap_or(MOST);
+        let finest = spatial_blocks(points, smallest);
+        // Blocks are cut into halves, and the halves again, so that the coarser ones are made of the finer ones.
+        let of_blocks = |blocks: usize| effect(finest.iter().map(|label| label * blocks / smallest), residuals, blocks);
+        let largest = doubled(FEWEST, MOST).map(of_blocks).fold(1.0, f64::max);
+        let chosen = ((count as f64 / largest / PIECES) as usize).clamp(FEWEST, MOST);
+        let labels = if chosen == MOST {
+            finest.iter().map(|label| label * MOST / smallest).collect()
+        } else {
+            spatial_blocks(points, chosen)
+        };
+        // The parameters take their part of the sums of blocks, but hardly of the points.
+        let left = |blocks: usize| blocks.saturating_sub(parameters).max(1) as f64 / blocks as f64;
+        let effects = doubled(MOST, smallest).map(|blocks| (blocks, of_blocks(blocks) / left(blocks)));
+        let effects: Vec<(usize, f64)> = effects.collect();
+        Self { labels, crossing: crossing(count, chosen, &effects) }
+    }
+}
+
+/// Twice as much each time, from a number up to another.
+fn doubled(first: usize, last: usize) -> impl Iterator<Item = usize> {
+    std::iter::successors(Some(first), |number| Some(2 * number)).take_while(move |&number| number <= last)
+}
+
+/// How many times as large an effect is as that of so many blocks, by those of the numbers of blocks that there are.
+///
+/// What neighbours have in common ends at a block's border, beside which lies a part of its points that is as large as
+/// one over the root of their number m: the inverse of the effect is nearly a + b / sqrt(m), and 1 / a the whole effect.
+fn crossing(count: usize, blocks: usize, effects: &[(usize, f64)]) -> f64 {
+    let border = |blocks: usize| (blocks as f64 / count as f64).sqrt();
+    let (mut whole, mut slope) = (1.0, 0.0);
+    // An effect is known to a part of itself: weights of the inverses are those of a first line, then of a second.
+    for _ in 0..3 {
+        let mut sums = [0.0; 5];
+        for &(blocks, effect) in effects {
+            let (x, y) = (border(blocks), 1.0 / effect);
+            let weight = blocks as f64 / f64::max(whole + slope * x, 1e-3 * y).powi(2);
+            for (sum, term) in sums.iter_mut().zip([1.0, x, x * x, y, x * y]) {
+                *sum += weight * term;
+            }
+        }
+        let [n, x, xx, y, xy] = sums;
+        let determinant = n * xx - x * x;
+        if !(determinant > 1e-9 * n * xx) {
+            return 1.0;
+        }
+        (whole, slope) = ((xx * y - x * xy) / determinant, (n * xy - x * y) / determinant);
+    }
+    let factor = 1.0 + slope * border(blocks) / whole;
+    if whole <= 0.0 { MOST_CROSSING } else { factor.clamp(1.0, MOST_CROSSING) }
 }
 
 /// By what factor fewer pieces are independent than points: the sum of a block's independent residuals has as many times
 /// the mean square of one as there are points in the block. Not a number where no residual is left.
 pub(crate) fn design_effect(points: &[Vector], residuals: &[f64], blocks: usize) -> f64 {
+    effect(spatial_blocks(points, blocks).into_iter(), residuals, blocks)
+}
+
+/// The same of blocks that are known, by the number of each point's.
+fn effect(labels: impl Iterator<Item = usize>, residuals: &[f64], blocks: usize) -> f64 {
     let mut sums = vec![0.0; blocks];
-    for (block, residual) in spatial_blocks(points, blocks).iter().zip(residuals) {
-        sums[*block] += residual;
+    for (block, residual) in labels.zip(residuals) {
+        sums[block] += residual;
     }
     let squares: f64 = residuals.iter().map(|r| r * r).sum();
     sums.iter().map(|sum| sum * sum).sum::<f64>() / squares
 }
 
+/// A point that is cut off from others, with its number. Its coordinates are parts of the points' extent: single
+/// precision is enough, and half of the memory is moved.
+struct Placed {
+    position: [f32; 3],
+    number: u32,
+}
+
 /// The number of each point's block: cut across the longest extent into blocks of nearly as many points each, no more
 /// blocks than points.
 pub(super) fn spatial_blocks(points: &[Vector], count: usize) -> Vec<usize> {
+    let far = Vector::repeat(f64::INFINITY);
+    let (low, high) = points.iter().fold((far, -far), |(low, high), p| (low.inf(p), high.sup(p)));
+    let scale = 1.0 / (high - low).max().max(f64::MIN_POSITIVE);
+    let placed = |(point, number): (&Vector, u32)| {
+        let part = scale * (point - low);
+        Placed { position: [part.x as f32, part.y as f32, part.z as f32], number }
+    };
+    let mut members: Vec<Placed> = points.iter().zip(0..).map(placed).collect();
     let mut labels = vec![0; points.len()];
-    let mut members: Vec<usize> = (0..points.len()).collect();
-    cut(points, &mut members, 0, count.min(points.len()), &mut labels);
+    cut(&mut members, 0, count.min(points.len()), &mut labels);
     labels
 }
 
-fn cut(points: &[Vector], members: &mut [usize], first: usize, count: usize, labels: &mut [usize]) {
+fn cut(members: &mut [Placed], first: usize, count: usize, labels: &mut [usize]) {
     if count <= 1 {
-        members.iter().for_each(|&member| labels[member] = first);
+        members.iter().for_each(|member| labels[member.number as usize] = first);
         return;
     }
-    let far = Vector::repeat(f64::INFINITY);
-    let bounds = |(low, high): (Vector, Vector), &member: &usize| {
-        (points[member].inf(&low), points[member].sup(&high))
+    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for member in members.iter() {
+        for axis in 0..3 {
+            low[axis] = low[axis].min(member.position[axis]);
+            high[axis] = high[axis].max(member.position[axis]);
+        }
+    }
+    let extent: [f32; 3] = std::array::from_fn(|axis| high[axis] - low[axis]);
+    let longest = if extent[0] >= extent[1] && extent[0] >= extent[2] {
+        0
+    } else if extent[1] >= extent[2] {
+        1
+    } else {
+        2
     };
-    let (low, high) = members.iter().fold((far, -far), bounds);
-    let axis = (high - low).imax();
     let half = count / 2;
     let middle = members.len() * half / count;
     // Of equal coordinates the one that comes first, so that the cut is always the same.
-    members
-        .select_nth_unstable_by(middle, |&a, &b| points[a][axis].total_cmp(&points[b][axis]).then(a.cmp(&b)));
+    members.select_nth_unstable_by(middle, |a, b| {
+        a.position[longest].total_cmp(&b.position[longest]).then(a.number.cmp(&b.number))
+    });
     let (left, right) = members.split_at_mut(middle);
-    cut(points, left, first, half, labels);
-    cut(points, right, first + half, count - half, labels);
+    cut(left, first, half, labels);
+    cut(right, first + half, count - half, labels);
 }
 
 #[cfg(test)]
@@ -87,11 +188,51 @@ mod tests {
     fn there_are_fewer_blocks_where_neighbours_err_alike() {
         let mut draws = Draws(16);
         let points = cube(400, &mut draws);
+        let count = |residuals: &[f64]| {
+            1 + *Blocks::of_residuals(&points, residuals, 3).labels.iter().max().unwrap()
+        };
         let apart: Vec<f64> = points.iter().map(|_| draws.normal()).collect();
-        assert_eq!(block_count(&points, &apart), 32);
+        assert_eq!(count(&apart), 32);
         let of_patch: Vec<f64> = (0..50).map(|_| draws.normal()).collect();
         let alike: Vec<f64> = spatial_blocks(&points, 50).iter().map(|&patch| of_patch[patch]).collect();
-        assert!(block_count(&points, &alike) < 12);
-        assert_eq!(block_count(&points, &[0.0; 400]), 32);
+        assert!(count(&alike) < 12);
+        assert_eq!(count(&[0.0; 400]), 32);
+    }
+
+    #[test]
+    fn coarser_blocks_are_made_of_finer_ones() {
+        for count in [32, 33, 100, 1023] {
+            let points = cube(count, &mut Draws(17));
+            let finest = spatial_blocks(&points, 32);
+            for coarser in [16, 8] {
+                let joined: Vec<usize> = finest.iter().map(|label| label * coarser / 32).collect();
+                assert_eq!(spatial_blocks(&points, coarser), joined);
+            }
+        }
+    }
+
+    #[test]
+    fn what_crosses_borders_is_told_by_smaller_blocks() {
+        let mut draws = Draws(18);
+        let (side, runs) = (64, 30);
+        let points: Vec<Vector> =
+            (0..side * side).map(|i| Vector::new((i % side) as f64, (i / side) as f64, 0.0)).collect();
+        let mean = |draws: &mut Draws, decay: f64| {
+            let of_run = |_| {
+                let mut last = draws.normal();
+                let residuals = points.iter().map(|point| {
+                    let begins = point.x == 0.0;
+                    last = if begins { draws.normal() } else { decay * last }
+                        + if begins { 0.0 } else { (1.0 - decay * decay).sqrt() * draws.normal() };
+                    last
+                });
+                Blocks::of_residuals(&points, &residuals.collect::<Vec<_>>(), 0).crossing
+            };
+            (0..runs).map(of_run).sum::<f64>() / f64::from(runs)
+        };
+        assert!((1.0..1.1).contains(&mean(&mut draws, 0.0)));
+        // Rows of 64 have 17 times the variance of one point, and pieces of 11 of them 9 times.
+        let found = mean(&mut draws, 0.9);
+        assert!((1.4..2.6).contains(&found), "{found}");
     }
 }

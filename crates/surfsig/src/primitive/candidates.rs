@@ -6,12 +6,13 @@
 
 use super::conditions::{Conditions, PrimitiveFitOptions};
 use super::geometry::{Primitive, Vector};
-use super::least_squares::{SCREENING, SLIDING, Termination, refine_with};
+use super::least_squares::{Fitted, SCREENING, SLIDING, Termination, refine_with};
 use super::start::{bent, circle, fitted_to_moments, smallest, start, with_normals};
-use super::{Fitted, SurfaceKind};
+use super::SurfaceKind;
 use crate::fit::spread_direction;
 use crate::geometry::axes_across;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector2};
+use std::borrow::Cow;
 
 /// Axes spread over half the sphere, about 20 degrees apart.
 const AXES: usize = 48;
@@ -48,11 +49,11 @@ pub(super) fn candidates(
     options: &PrimitiveFitOptions,
 ) -> Vec<Primitive> {
     let direction = options.axis.map(|axis| Vector::from(axis).normalize());
-    let raw: Vec<Primitive> = read_off(kind, points, extent, direction, options.weights)
+    let (sample, weights) = sample(points, options.weights, SAMPLE);
+    let raw: Vec<Primitive> = read_off(kind, &sample, extent, direction, weights.as_deref())
         .into_iter()
         .flat_map(|p| with_given(&p, options))
         .collect();
-    let (sample, weights) = sample(points, options.weights);
     let conditions = Conditions { weights: weights.as_deref(), ..options.conditions(kind) };
     let best = |starts: &[Primitive], termination: Termination| {
         let refined = starts.iter().filter_map(|p| {
@@ -72,7 +73,7 @@ pub(super) fn candidates(
 }
 
 /// Surfaces that are not alike, the best first.
-fn distinct(mut fits: Vec<Fitted>, extent: f64) -> Vec<Fitted> {
+pub(super) fn distinct(mut fits: Vec<Fitted>, extent: f64) -> Vec<Fitted> {
     fits.sort_by(|a, b| a.rms.total_cmp(&b.rms));
     let mut kept: Vec<Fitted> = Vec::new();
     for fitted in fits {
@@ -93,15 +94,18 @@ fn alike(a: &Primitive, b: &Primitive, extent: f64) -> bool {
         && (a.point - b.point).norm() < 0.01 * (extent + a.radius.abs())
 }
 
-/// A sample of the points with its weights.
-fn sample(points: &[Vector], weights: Option<&[f64]>) -> (Vec<Vector>, Option<Vec<f64>>) {
-    let chosen: Vec<usize> = if points.len() <= SAMPLE {
-        (0..points.len()).collect()
-    } else {
-        (0..SAMPLE).map(|i| ((i as f64 * GOLDEN).fract() * points.len() as f64) as usize).collect()
-    };
-    let weights = weights.map(|weights| chosen.iter().map(|&i| weights[i]).collect());
-    (chosen.iter().map(|&i| points[i]).collect(), weights)
+/// At most so many of the points, with their weights.
+pub(super) fn sample<'a>(
+    points: &'a [Vector],
+    weights: Option<&'a [f64]>,
+    most: usize,
+) -> (Cow<'a, [Vector]>, Option<Cow<'a, [f64]>>) {
+    if points.len() <= most {
+        return (points.into(), weights.map(Into::into));
+    }
+    let chosen = || (0..most).map(|i| ((i as f64 * GOLDEN).fract() * points.len() as f64) as usize);
+    let weights = weights.map(|weights| chosen().map(|i| weights[i]).collect());
+    (chosen().map(|i| points[i]).collect(), weights)
 }
 
 /// The surface with the radius that is given: it touches the same place, on either side.
@@ -119,7 +123,7 @@ fn with_given(p: &Primitive, options: &PrimitiveFitOptions) -> Vec<Primitive> {
     vec![Primitive { radius, ..p }, moved(radius), moved(-radius)]
 }
 
-/// Surfaces for all axes, or for the one that is given.
+/// Surfaces for all axes, or for the one that is given, of no more points than a sample has.
 fn read_off(
     kind: SurfaceKind,
     points: &[Vector],
@@ -159,13 +163,11 @@ fn read_off(
         let algebraic = [fitted_to_moments(kind, points), start(kind, points, &[])];
         return algebraic.into_iter().flatten().chain(touching).collect();
     }
-    // All points may be a sample's: what is read off needs no more.
-    let (points, _) = sample(points, None);
-    let on_axes = axes.iter().flat_map(|axis| about(kind, &points, axis));
+    let on_axes = axes.iter().flat_map(|axis| about(kind, points, axis));
     let mut found: Vec<Primitive> = on_axes.collect();
     let positions: Vec<[f64; 3]> = points.iter().map(|&point| point.into()).collect();
     if kind == SurfaceKind::Cylinder {
-        found.extend(fitted_to_moments(kind, &points));
+        found.extend(fitted_to_moments(kind, points));
     }
     if matches!(kind, SurfaceKind::Cone | SurfaceKind::Torus) {
         let (known, normals) = with_normals(&positions);
@@ -173,7 +175,7 @@ fn read_off(
         // The cylinder that a torus nearly is lies across the torus's axis.
         let axis = direction.filter(|_| kind == SurfaceKind::Cone).map(Into::into);
         let of_pipes = PrimitiveFitOptions { axis, ..Default::default() };
-        let pipes = candidates(SurfaceKind::Cylinder, &points, extent, &of_pipes);
+        let pipes = candidates(SurfaceKind::Cylinder, points, extent, &of_pipes);
         found.extend(pipes.iter().flat_map(|pipe| bent(pipe, kind, extent)));
     }
     found

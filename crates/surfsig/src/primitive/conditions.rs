@@ -2,6 +2,7 @@
 
 use super::SurfaceKind;
 use super::geometry::{MOST_PARAMETERS, Primitive, Vector};
+use std::borrow::Cow;
 
 /// What is known of a surface before [`crate::fit_primitive_with`] fits it.
 ///
@@ -39,6 +40,21 @@ impl PrimitiveFitOptions<'_> {
                 let length = Vector::from(axis).norm();
                 kind != SurfaceKind::Sphere && length > 0.0 && length.is_finite()
             })
+    }
+
+    /// The points that have a weight, with it: another tells nothing, not even where the others are.
+    pub(super) fn counted<'a>(
+        &'a self,
+        points: &'a [[f64; 3]],
+    ) -> (Cow<'a, [[f64; 3]]>, Option<Cow<'a, [f64]>>) {
+        match self.weights {
+            Some(weights) if weights.contains(&0.0) => {
+                let counted = || (0..points.len()).filter(|&i| weights[i] > 0.0);
+                let weights = counted().map(|i| weights[i]).collect();
+                (counted().map(|i| points[i]).collect(), Some(weights))
+            }
+            weights => (points.into(), weights.map(Into::into)),
+        }
     }
 
     /// The same for the least squares.

@@ -61,7 +61,12 @@ impl SurfaceKind {
     }
 
     /// Whether its radius alone says how large it is, so that it may be given.
-    pub(super) fn has_free_radius(self) -> bool {
+    ///
+    /// ```
+    /// use surfsig::SurfaceKind;
+    /// assert!(SurfaceKind::Circle.has_free_radius() && !SurfaceKind::Torus.has_free_radius());
+    /// ```
+    pub fn has_free_radius(self) -> bool {
         [Self::Sphere, Self::Cylinder, Self::Circle].contains(&self)
     }
 }

@@ -1,5 +1,6 @@
 //! Surfaces fitted by orthogonal distance: Levenberg and Marquardt's steps, then Gauss and Newton's to the last digits.
 
+use super::MANY;
 use super::conditions::Conditions;
 use super::geometry::{MOST_PARAMETERS, Primitive, Vector};
 use super::linear::Linear;
@@ -41,6 +42,14 @@ const MAX_HALVINGS: u32 = 5;
 /// Relative error of a sum of squares that is rounding's.
 const ROUNDING_OF_SUM: f64 = 1e-12;
 
+/// What may be left of the gradient where [`polish`] ends, in units of the residuals' length: of their standard errors,
+/// the parameters lack so much times the root of the points' number.
+const NEARLY: f64 = 1e-8;
+
+/// A step with many points is the last one where it is so small a part of the parameters' standard errors: of itself it
+/// leaves no more than such a part.
+const CERTAIN: f64 = 1e-5;
+
 /// Distances that are nothing, in units of the points' extent.
 const NOTHING: f64 = 1e-12;
 
@@ -50,6 +59,14 @@ pub(crate) struct Fitted {
     pub primitive: Primitive,
     /// Root mean square of the distances.
     pub rms: f64,
+}
+
+/// A surface to which [`polish`] came.
+#[derive(Clone, Copy)]
+pub(super) struct Polished {
+    pub primitive: Primitive,
+    /// Whether nothing is left of the gradient.
+    pub converged: bool,
 }
 
 /// The nearest surface of the same kind for which the sum of squared distances is least; `None` where there is none,
@@ -120,33 +137,43 @@ pub(super) fn refine_with(
     valid.then(|| Fitted { primitive, rms: (sum / count).sqrt() })
 }
 
-/// Gauss and Newton's steps by a triangle of the Jacobian, until rounding alone is left of the gradient.
+/// Gauss and Newton's steps by a triangle of the Jacobian, until rounding alone is left of the gradient; `None` where the
+/// points do not determine the parameters.
 ///
 /// The gradient, in the metric in which the sum of squares is round, is what becomes 0: a sum of squares stops to change
 /// where the parameters have half of their digits.
-pub(super) fn polish(start: Primitive, points: &[Vector], conditions: &Conditions) -> Primitive {
+pub(super) fn polish(start: Primitive, points: &[Vector], conditions: &Conditions) -> Option<Polished> {
     let free = conditions.free_parameters();
-    let Some(mut linear) = Linear::of(&start, points, conditions) else {
-        return start;
-    };
-    let (mut primitive, (mut step, mut left)) = (start, linear.step());
+    let (mut primitive, mut linear) = (start, Linear::of(&start, points, conditions)?);
     for _ in 0..MAX_POLISHING_STEPS {
-        // Points extend by 1: each distance is rounded by some epsilons, and each sum by one of its terms' lengths.
-        if left <= f64::EPSILON * (4.0 + linear.sum().sqrt()) {
+        let left = linear.gradient_left();
+        if left <= linear.rounding() {
             break;
         }
-        let most = linear.sum() * (1.0 + ROUNDING_OF_SUM);
+        let (step, most) = (linear.step(), linear.sum * (1.0 + ROUNDING_OF_SUM));
+        if points.len() > MANY && left <= CERTAIN * linear.variance().sqrt() {
+            // Nothing will be left of the gradient, and to look at so many points takes long.
+            let primitive = primitive.chart().moved(&all_parameters(&step, &free));
+            return Some(Polished { primitive, converged: true });
+        }
         let better = (0..=MAX_HALVINGS).find_map(|halving| {
-            let moved =
-                primitive.chart().moved(&all_parameters(&(&step * 0.5_f64.powi(halving as i32)), &free));
-            let next = Linear::of(&moved, points, conditions).filter(|next| next.sum() <= most)?;
-            let (next_step, next_left) = next.step();
-            (next_left < left).then_some((moved, next, next_step, next_left))
+            let step = &step * 0.5_f64.powi(halving as i32);
+            let moved = primitive.chart().moved(&all_parameters(&step, &free));
+            let next = Linear::of(&moved, points, conditions)?;
+            (next.sum <= most && next.gradient_left() < left).then_some((moved, next))
         });
         let Some(better) = better else { break };
-        (primitive, linear, step, left) = better;
+        (primitive, linear) = better;
     }
-    primitive
+    let converged = linear.gradient_left() <= NEARLY * linear.sum.sqrt() + linear.rounding();
+    Some(Polished { primitive, converged })
+}
+
+/// d^T W d.
+pub(super) fn sum_of_squares(primitive: &Primitive, points: &[Vector], conditions: &Conditions) -> f64 {
+    let chart = primitive.chart();
+    let square = |(number, point)| conditions.weight(number) * chart.distance(point).powi(2);
+    points.iter().enumerate().map(square).sum()
 }
 
 /// A step of all parameters, 0 for those that are kept.

@@ -22,11 +22,15 @@ pub use kind::SurfaceKind;
 pub(crate) use least_squares::{EXACT, QUICK, Termination, refine};
 pub(crate) use start::{bent, start};
 pub use uncertainty::PrimitiveUncertainty;
-pub(crate) use uncertainty::uncertainty;
+pub(crate) use uncertainty::{Uncertainty, uncertainty};
 
-use candidates::candidates;
-use least_squares::{EXHAUSTIVE, Fitted, polish, refine_with};
-use linear::Linear;
+use candidates::{candidates, distinct, sample};
+use conditions::Conditions;
+use least_squares::{EXHAUSTIVE, polish, refine_with, sum_of_squares};
+
+/// Points of which a fit takes a sample until it is near its minimum, as near as the standard errors of so many are: two
+/// or three steps with all points lead on from there.
+const MANY: usize = 4000;
 
 /// Fits a surface to points: the sum of squared orthogonal distances is least.
 ///
@@ -70,21 +74,27 @@ pub fn fit_primitive_with(
     kind: SurfaceKind,
     options: &PrimitiveFitOptions,
 ) -> Option<Primitive> {
+    if !options.are_valid(kind, points.len()) {
+        return None;
+    }
+    let (points, weights) = options.counted(points);
+    fit_counted(&points, kind, &PrimitiveFitOptions { weights: weights.as_deref(), ..*options })
+}
+
+/// The same of points that all have a weight.
+fn fit_counted(points: &[[f64; 3]], kind: SurfaceKind, options: &PrimitiveFitOptions) -> Option<Primitive> {
     let conditions = options.conditions(kind);
-    if !options.are_valid(kind, points.len())
-        || points.len() * kind.components() <= conditions.free_parameters().len()
-        || points.len() < 3
-    {
+    if points.len() * kind.components() <= conditions.free_parameters().len() || points.len() < 3 {
         return None;
     }
     // About their mean and in their own unit: squares of coordinates far from 0 lose digits. A power of 2 loses none.
     let mean = points.iter().map(|&p| Vector::from(p)).sum::<Vector>() / points.len() as f64;
-    let about_mean: Vec<Vector> = points.iter().map(|&p| Vector::from(p) - mean).collect();
-    let unit = extent(&about_mean).log2().round().exp2();
+    let mut local: Vec<Vector> = points.iter().map(|&p| Vector::from(p) - mean).collect();
+    let unit = extent(&local).log2().round().exp2();
     if !(unit > 0.0 && unit.is_finite()) {
         return None;
     }
-    let local: Vec<Vector> = about_mean.iter().map(|p| p / unit).collect();
+    local.iter_mut().for_each(|p| *p /= unit);
     let extent = extent(&local);
     let radius = options.radius.map(|radius| radius / unit);
     let local_options = PrimitiveFitOptions { radius, ..*options };
@@ -96,15 +106,35 @@ pub fn fit_primitive_with(
         }
         None => candidates(kind, &local, extent, &local_options),
     };
-    let fits = starts.iter().filter_map(|start| {
-        refine_with(start.beside(&Vector::zeros()), &local, extent, &conditions, EXHAUSTIVE)
-    });
-    let best: Fitted = fits.min_by(|a, b| a.rms.total_cmp(&b.rms))?;
-    // The point at which shifts are counted is beside the mean of the points.
-    let beside = best.primitive.beside(&Vector::zeros());
-    let primitive = polish(beside, &local, &conditions).beside(&Vector::zeros()).upward();
-    Linear::of(&primitive, &local, &conditions)?;
+    let primitive = least(&starts, &local, extent, &conditions)?.beside(&Vector::zeros()).upward();
     primitive.is_valid(extent, EXHAUSTIVE.flat).then(|| primitive.scaled(unit).shifted(&mean))
+}
+
+/// The surface with the least of the minima to which starts lead, to the last digits; `None` where there is none, or
+/// the points do not determine it. Its point, at which shifts are counted, is beside 0.
+fn least(starts: &[Primitive], points: &[Vector], extent: f64, conditions: &Conditions) -> Option<Primitive> {
+    // Of many points some lead near the minimum, and only the last steps look at all.
+    let (some, weights) = sample(points, conditions.weights, MANY);
+    let some_conditions = Conditions { weights: weights.as_deref(), ..*conditions };
+    let beside = |primitive: &Primitive| primitive.beside(&Vector::zeros());
+    let fits = starts.iter().filter_map(|start| {
+        refine_with(beside(start), &some, extent, &some_conditions, EXHAUSTIVE)
+    });
+    let fits = distinct(fits.collect(), extent);
+    let near = if some.len() == points.len() || fits.len() == 1 {
+        fits.into_iter().next()?.primitive
+    } else {
+        let sums = fits.iter().map(|fitted| sum_of_squares(&fitted.primitive, points, conditions));
+        let ranked = fits.iter().zip(sums).min_by(|(_, a), (_, b)| a.total_cmp(b));
+        ranked?.0.primitive
+    };
+    let polished = polish(beside(&near), points, conditions)?;
+    if polished.converged || some.len() == points.len() {
+        return Some(polished.primitive);
+    }
+    // What some points tell is not near enough.
+    let all = refine_with(beside(&near), points, extent, conditions, EXHAUSTIVE)?.primitive;
+    Some(polish(beside(&all), points, conditions)?.primitive)
 }
 
 #[cfg(test)]

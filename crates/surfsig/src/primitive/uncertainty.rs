@@ -7,10 +7,10 @@
 //! correlation that is short against the blocks. An interval takes Student's t with the degrees of freedom that the
 //! blocks leave.
 
-use super::blocks::{block_count, spatial_blocks};
+use super::blocks::Blocks;
 use super::conditions::{Conditions, PrimitiveFitOptions};
 use super::geometry::{MOST_PARAMETERS, Primitive, Vector};
-use super::linear::Linear;
+use super::linear::{Linear, Row, visit_rows};
 use nalgebra::{DMatrix, DVector};
 
 /// Of a block's points alone, this part of what determines a parameter is all of it.
@@ -52,51 +52,63 @@ fn uncertainty_with(
 ) -> Option<Uncertainty> {
     let linear = Linear::of(primitive, points, conditions)?;
     let components = primitive.kind.components();
-    let first: Vec<f64> = linear.residuals.iter().step_by(components).copied().collect();
-    // Noise is as wide as a block of a curve: blocks are pieces of the curve, not sides of it.
     let chart = primitive.chart();
+    let residual = |(number, point)| conditions.weight(number).sqrt() * chart.components(point)[0].0;
+    let first: Vec<f64> = points.iter().enumerate().map(residual).collect();
+    // Noise is as wide as a block of a curve: blocks are pieces of the curve, not sides of it.
     let feet: Option<Vec<Vector>> =
         (components > 1).then(|| points.iter().map(|point| chart.foot_on_curve(point)).collect());
-    let places = feet.as_deref().unwrap_or(points);
-    let of_points = spatial_blocks(places, block_count(places, &first));
-    let labels: Vec<usize> =
-        of_points.iter().flat_map(|&label| std::iter::repeat_n(label, components)).collect();
     let free = conditions.free_parameters();
+    let blocks = Blocks::of_residuals(feet.as_deref().unwrap_or(points), &first, free.len());
     // Of a radius that is kept no degrees of freedom are asked for.
     let size = free.iter().position(|&parameter| parameter == primitive.kind.size()).unwrap_or(0);
-    let of_free = linear.uncertainty(&labels, size)?;
+    let mut sums = vec![BlockSums::default(); blocks.labels.iter().max()? + 1];
+    let mut labels = blocks.labels.iter().flat_map(|&label| std::iter::repeat_n(label, components));
+    visit_rows(primitive, points, conditions, |row, residual| {
+        if let Some(label) = labels.next() {
+            sums[label].add(&linear, row, residual);
+        }
+    });
+    let of_free = linear.uncertainty(&sums, size)?;
     let parameters = primitive.kind.parameters();
     let mut covariance = DMatrix::zeros(parameters, parameters);
     for (i, &row) in free.iter().enumerate() {
         for (j, &column) in free.iter().enumerate() {
-            covariance[(row, column)] = of_free.covariance[(i, j)];
+            covariance[(row, column)] = blocks.crossing * of_free.covariance[(i, j)];
         }
     }
     Some(Uncertainty { covariance, ..of_free })
 }
 
-impl Linear {
-    /// The covariance with independent blocks, and the freedom of one parameter's variance.
-    fn uncertainty(&self, labels: &[usize], parameter: usize) -> Option<Uncertainty> {
-        let parameters = self.parameters;
-        let count = labels.iter().max()? + 1;
-        // Of each block q^T q and q^T r, in the basis q of the Jacobian's columns.
-        let mut normal = vec![[[0.0; MOST_PARAMETERS]; MOST_PARAMETERS]; count];
-        let mut gradient = vec![[0.0; MOST_PARAMETERS]; count];
-        for ((row, residual), &label) in self.jacobian.iter().zip(&self.residuals).zip(labels) {
-            let q = self.orthonormal(row);
-            for i in 0..parameters {
-                gradient[label][i] += q[i] * residual;
-                for j in 0..=i {
-                    normal[label][i][j] += q[i] * q[j];
-                }
+/// Of a block q^T q and q^T r, in the basis q of the Jacobian's columns.
+#[derive(Clone, Default)]
+struct BlockSums {
+    normal: [[f64; MOST_PARAMETERS]; MOST_PARAMETERS],
+    gradient: [f64; MOST_PARAMETERS],
+}
+
+impl BlockSums {
+    fn add(&mut self, linear: &Linear, row: &Row, residual: f64) {
+        let q = linear.orthonormal(row);
+        for i in 0..linear.parameters {
+            self.gradient[i] += q[i] * residual;
+            for j in 0..=i {
+                self.normal[i][j] += q[i] * q[j];
             }
         }
+    }
+}
+
+impl Linear {
+    /// The covariance with independent blocks, and the freedom of one parameter's variance.
+    fn uncertainty(&self, blocks: &[BlockSums], parameter: usize) -> Option<Uncertainty> {
+        let parameters = self.parameters;
+        let count = blocks.len();
         let mut middle = DMatrix::<f64>::zeros(parameters, parameters);
         let mut gram = DMatrix::<f64>::zeros(count, count);
         // What the parameter's error is to each block's residuals: q (1 - q^T q)^-1/2 c.
         let mut errors = DMatrix::<f64>::zeros(parameters, count);
-        for (block, (normal, gradient)) in normal.iter().zip(&gradient).enumerate() {
+        for (number, BlockSums { normal, gradient }) in blocks.iter().enumerate() {
             let normal = DMatrix::from_fn(parameters, parameters, |i, j| normal[i.max(j)][i.min(j)]);
             let gradient = DVector::from_column_slice(&gradient[..parameters]);
             let taken = normal.clone().symmetric_eigen();
@@ -110,8 +122,8 @@ impl Linear {
             middle.ger(1.0, &score, &score, 1.0);
             let weights = correction * self.inverse.row(parameter).transpose();
             let error = normal * &weights;
-            gram[(block, block)] = weights.dot(&error);
-            errors.set_column(block, &error);
+            gram[(number, number)] = weights.dot(&error);
+            errors.set_column(number, &error);
         }
         gram -= errors.tr_mul(&errors);
         Some(Uncertainty {
@@ -159,7 +171,9 @@ impl Primitive {
     ) -> PrimitiveUncertainty {
         let parameters = self.kind.parameters();
         let found = if options.are_valid(self.kind, points.len()) {
-            uncertainty_with(&self.shifted(&-self.point), &self.local(points), &options.conditions(self.kind))
+            let (points, weights) = options.counted(points);
+            let options = PrimitiveFitOptions { weights: weights.as_deref(), ..*options };
+            uncertainty_with(&self.shifted(&-self.point), &self.local(&points), &options.conditions(self.kind))
         } else {
             None
         };
@@ -193,6 +207,8 @@ impl Primitive {
 #[cfg(test)]
 mod tests {
     use super::super::least_squares::{EXACT, refine};
+    use super::super::blocks::spatial_blocks;
+    use super::super::linear::tests::of_rows;
     use super::super::{SurfaceKind, fit_primitive};
     use super::*;
     use crate::fit::samples::Draws;
@@ -254,17 +270,19 @@ mod tests {
     fn blocks_of_one_point_give_the_known_covariance() {
         // White's estimator HC2: the sum of x x^T r^2 / (1 - leverage).
         let mut draws = Draws(9);
-        let rows: Vec<[f64; MOST_PARAMETERS]> =
-            (0..40).map(|_| std::array::from_fn(|i| if i < 3 { draws.normal() } else { 0.0 })).collect();
-        let residuals: Vec<f64> = rows.iter().map(|_| draws.normal()).collect();
-        let x = DMatrix::from_fn(40, 3, |i, j| rows[i][j]);
+        let rows: Vec<(Row, f64)> = (0..40)
+            .map(|_| (std::array::from_fn(|i| if i < 3 { draws.normal() } else { 0.0 }), draws.normal()))
+            .collect();
+        let x = DMatrix::from_fn(40, 3, |i, j| rows[i].0[j]);
         let inverse = x.tr_mul(&x).try_inverse().unwrap();
         let hat = &x * &inverse * x.transpose();
         let rest = DVector::from_fn(40, |i, _| 1.0 - hat[(i, i)]);
-        let meat = DMatrix::from_diagonal(&DVector::from_fn(40, |i, _| residuals[i].powi(2) / rest[i]));
+        let meat = DMatrix::from_diagonal(&DVector::from_fn(40, |i, _| rows[i].1.powi(2) / rest[i]));
         let expected = &inverse * x.tr_mul(&meat) * &x * &inverse;
-        let labels: Vec<usize> = (0..40).collect();
-        let found = Linear::new(3, rows, residuals).unwrap().uncertainty(&labels, 2).unwrap();
+        let linear = of_rows(3, &rows).unwrap();
+        let mut blocks = vec![BlockSums::default(); 40];
+        blocks.iter_mut().zip(&rows).for_each(|(block, (row, residual))| block.add(&linear, row, *residual));
+        let found = linear.uncertainty(&blocks, 2).unwrap();
         assert!((&found.covariance - &expected).norm() < 1e-10 * expected.norm());
         // Satterthwaite's: (sum of eigenvalues)^2 / sum of squares, of the quadratic form in the noise.
         let mut weights = DMatrix::identity(40, 40) - hat;

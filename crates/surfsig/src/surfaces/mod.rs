@@ -1,17 +1,19 @@
 //! Which parts of a scan are planes, spheres, cylinders, cones and tori.
 //!
 //! [`scene`] knows each point's neighbours, normal and noise ([`surroundings`]); [`growth`] lets a [`crate::Primitive`] grow, [`merging`]
-//! joins what is one and shares out what lies between; [`unexplained`] looks again among the points that are left.
+//! joins what is one and shares out what lies between; [`unexplained`] looks again among the points that are left;
+//! [`measurement`] says what each surface measures.
 
 mod graph;
 mod growth;
 mod likeness;
+mod measurement;
 mod merging;
 mod scene;
 mod surroundings;
 mod unexplained;
 
-use crate::primitive::{SurfaceKind, Vector, uncertainty};
+use crate::primitive::SurfaceKind;
 use crate::{Error, Monitor, PointCloud, with_threads};
 use growth::{Grower, Region};
 use scene::{LOCAL, NONE, Scene, Stamps};
@@ -25,9 +27,6 @@ const MOST_SEEDS: usize = 100_000;
 /// Nearest points by which noise and normals are judged: first few, then more where no surface was found, for the
 /// neighbours in a scan may err together.
 const LEVELS: [usize; 3] = [LOCAL, 4 * LOCAL, 16 * LOCAL];
-
-/// Standard errors by which a size must differ from what a simpler kind has in its place.
-const SIGNIFICANT: f64 = 2.0;
 
 /// How surfaces are found.
 ///
@@ -61,7 +60,7 @@ pub struct FoundSurface {
     pub major_radius: f64,
     /// Of a cone, in radians; not a number for others.
     pub half_angle: f64,
-    /// Root mean square of its points' distances, corrected for its parameters.
+    /// Root mean square of the distances of its points away from borders, corrected for its parameters.
     pub deviation: f64,
     /// Number of its points.
     pub count: usize,
@@ -137,7 +136,7 @@ pub fn find_surfaces(
         if unexplained::add(&mut scene, &mut regions, &kinds, fewest, monitor)? {
             share_out(&mut scene, &mut regions);
         }
-        Ok(assembled(cloud.len(), &scene, &kinds, regions))
+        Ok(assembled(cloud.len(), scene, &kinds, regions))
     })?
 }
 
@@ -201,72 +200,17 @@ fn regions(
 }
 
 /// What was found, the largest first.
-fn assembled(points: usize, scene: &Scene, kinds: &[SurfaceKind], mut regions: Vec<Region>) -> FoundSurfaces {
+fn assembled(
+    points: usize,
+    mut scene: Scene,
+    kinds: &[SurfaceKind],
+    mut regions: Vec<Region>,
+) -> FoundSurfaces {
     regions.sort_by_key(|region| std::cmp::Reverse(region.members.len()));
+    merging::relabel(&mut scene, &regions);
     let mut labels = vec![NONE; points];
-    let surfaces = regions.iter_mut().enumerate().map(|(number, region)| {
-        for &member in &region.members {
-            labels[scene.numbers[member as usize] as usize] = number as i32;
-        }
-        // A fit that fails keeps the last one.
-        let _ = region.fit(scene, usize::MAX);
-        let mut found = described(region, scene);
-        while let Some(simpler) = insignificant(&found).filter(|simpler| kinds.contains(simpler)) {
-            let Some(as_smooth) = region.of_kind(simpler, scene) else { break };
-            *region = as_smooth;
-            found = described(region, scene);
-        }
-        found
-    });
-    let surfaces = surfaces.collect();
-    FoundSurfaces { labels, surfaces }
-}
-
-/// The simpler kind that a surface is not significantly different from: a sphere or cylinder whose radius is uncertain by
-/// half of itself may as well be a plane, and a cone that hardly opens a cylinder.
-fn insignificant(found: &FoundSurface) -> Option<SurfaceKind> {
-    let (size, error, simpler) = match found.kind {
-        SurfaceKind::Sphere | SurfaceKind::Cylinder => (found.radius, found.radius_std, SurfaceKind::Plane),
-        SurfaceKind::Cone => (found.half_angle, found.half_angle_std, SurfaceKind::Cylinder),
-        SurfaceKind::Plane | SurfaceKind::Torus | SurfaceKind::Circle | SurfaceKind::Line => return None,
-    };
-    (size < SIGNIFICANT * error).then_some(simpler)
-}
-
-/// A region's surface with its errors.
-fn described(region: &Region, scene: &Scene) -> FoundSurface {
-    let p = &region.primitive;
-    let points: Vec<Vector> = region.members.iter().map(|&member| scene.points[member as usize]).collect();
-    let sure = uncertainty(p, &points);
-    let parameters = p.kind.parameters();
-    // Of a parameter by its place in the covariance, on one kind of surface.
-    let deviation = |kind: SurfaceKind, place: usize| match &sure {
-        Some(sure) if p.kind == kind => sure.covariance[(place, place)].sqrt(),
-        _ => f64::NAN,
-    };
-    let radius_std = match p.kind {
-        SurfaceKind::Plane | SurfaceKind::Circle | SurfaceKind::Line => f64::NAN,
-        SurfaceKind::Sphere => deviation(p.kind, 3),
-        SurfaceKind::Cylinder | SurfaceKind::Cone => deviation(p.kind, 4),
-        SurfaceKind::Torus => deviation(p.kind, 6),
-    };
-    let only = |kind: SurfaceKind, value: f64| if p.kind == kind { value } else { f64::NAN };
-    FoundSurface {
-        kind: p.kind,
-        point: (p.point + scene.origin).into(),
-        axis: if p.kind == SurfaceKind::Sphere { [f64::NAN; 3] } else { p.axis.into() },
-        radius: if p.kind == SurfaceKind::Plane { f64::NAN } else { p.radius },
-        major_radius: only(SurfaceKind::Torus, p.major_radius),
-        half_angle: only(SurfaceKind::Cone, p.half_angle),
-        deviation: region.deviation,
-        count: region.members.len(),
-        radius_std,
-        major_radius_std: deviation(SurfaceKind::Torus, 5),
-        half_angle_std: deviation(SurfaceKind::Cone, 5),
-        covariance: sure.as_ref().map_or_else(Vec::new, |sure| {
-            (0..parameters * parameters).map(|i| sure.covariance[(i / parameters, i % parameters)]).collect()
-        }),
-        across: p.chart().across.map(Into::into),
-        freedom: sure.map_or(f64::NAN, |sure| sure.freedom),
+    for (&number, &label) in scene.numbers.iter().zip(&scene.labels) {
+        labels[number as usize] = label;
     }
+    FoundSurfaces { labels, surfaces: measurement::measured(&scene, kinds, &regions) }
 }
