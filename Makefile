@@ -10,7 +10,7 @@ PREFIX ?= /usr/local
 # What the compiled module is made from; a change of any rebuilds it.
 SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -name '*.bin' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help demo test test-all lint format bench bench-reading bench-error bench-segmentation bench-registration bench-finding bench-odometry fuzz docs tour wheel check-wheel header install-c clean build
+.PHONY: help demo test test-all lint format bench bench-reading bench-error bench-segmentation bench-intervals bench-registration bench-finding bench-odometry fuzz docs tour wheel check-wheel header install-c clean build
 .DEFAULT_GOAL := help
 
 help: ## Say what there is to make
@@ -53,6 +53,9 @@ bench-error: build ## Measure the error of curvature beside CGAL's jets, and wri
 
 bench-segmentation: build ## Score the surfaces found in clouds of known ones, and write that part of BENCHMARKS.md
 	$(BIN)/python benchmarks/segmentation.py --write
+
+bench-intervals: build ## Count the intervals that hold the sizes of surfaces found, and write that part of BENCHMARKS.md
+	$(BIN)/python benchmarks/intervals.py --write
 
 bench-registration: build ## Register pairs of scans beside the peers, and write that part of BENCHMARKS.md
 	$(BIN)/python benchmarks/registration.py --write

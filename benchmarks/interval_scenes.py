@@ -87,7 +87,7 @@ def _rows(
 
 def _steps(length: float, spacing: float) -> Array:
     """Give positions from 0 to a length, so far apart."""
-    return (np.arange(max(int(length / spacing), 1)) + 0.5) * spacing
+    return np.asarray((np.arange(max(int(length / spacing), 1)) + 0.5) * spacing)
 
 
 def _flat(corner: Array, first: Array, second: Array, spacing: float, rng: np.random.Generator) -> Patch:
@@ -237,7 +237,9 @@ def _flat_piece(arc: float, spacing: float, rng: np.random.Generator) -> Made:
     return patch, [rounded, wall], Truth("plane", np.array([1.0, 0, 0]), np.array([1.0, 0, 0]), 1.0)
 
 
-MAKERS: dict[str, tuple[Callable[[float, float, np.random.Generator], Made], ...]] = {
+Maker = Callable[[float, float, np.random.Generator], Made]
+
+MAKERS: dict[str, tuple[Maker, ...]] = {
     "plane": (_flat_piece,),
     "sphere": (_sphere,),
     "cylinder": (_between_walls, _on_a_floor),
@@ -248,7 +250,7 @@ MAKERS: dict[str, tuple[Callable[[float, float, np.random.Generator], Made], ...
 
 KINDS = tuple(MAKERS)
 
-MOST_OF_WALLS = 300.0
+MOST_ARCS: dict[Maker, float] = {_between_walls: 300.0, _elbow: 180.0}
 """Degrees of a cylinder between walls, and of an elbow: these meet where there is more."""
 
 
@@ -265,7 +267,7 @@ def interval_scene(kind: str, noise: str, seed: int) -> IntervalScene:
     rng = np.random.default_rng([seed, KINDS.index(kind), NOISES.index(noise)])
     makers = MAKERS[kind]
     maker = makers[seed % len(makers)]
-    most = {_between_walls: MOST_OF_WALLS, _elbow: 180.0}.get(maker, ARCS[1])
+    most = MOST_ARCS.get(maker, ARCS[1])
     arc, spacing = rng.uniform(ARCS[0], most), rng.uniform(0.03, 0.06)
     patch, neighbours, truth = maker(math.radians(arc), spacing, rng)
     deviation = 10 ** rng.uniform(-3, -2) * truth.radius
@@ -292,4 +294,5 @@ def _noisy(patch: Patch, noise: str, deviation: float, rng: np.random.Generator)
     common = white[0].copy()
     for number in np.flatnonzero(~begins):
         common[number] = decay * common[number - 1] + math.sqrt(1 - decay**2) * white[0, number]
-    return patch.points + deviation * math.sqrt(0.5) * (common + white[1])[:, None] * patch.normals
+    along = deviation * math.sqrt(0.5) * (common + white[1])
+    return np.asarray(patch.points + along[:, None] * patch.normals)

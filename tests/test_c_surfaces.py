@@ -221,7 +221,7 @@ def test_fits_where_something_is_known(c: CInterface, kind: str, values: dict[st
 
 def test_what_is_known_must_suit_the_kind_and_the_points(c: CInterface) -> None:
     points, made = points_of("cone"), c_void_p(1)
-    wrong = {
+    wrong: dict[str, dict[str, Any]] = {
         "a cone keeps no radius": {"radius": 1.0},
         "weights must be one of each of the 6000 points, not 2": {"weights": np.ones(2)},
     }

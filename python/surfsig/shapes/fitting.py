@@ -18,7 +18,7 @@ from surfsig.point_cloud import PointCloud, position_array
 from surfsig.progress import ProgressCallback
 from surfsig.resolution import warn_if_surface_is_lost
 from surfsig.shapes.growth import grown
-from surfsig.shapes.known import Known, known_of
+from surfsig.shapes.known import ALL, Known, known_of
 from surfsig.shapes.measured import measured_surface
 from surfsig.shapes.minimum_zone import minimum_zone
 from surfsig.shapes.robust import fitted_to_inliers, variance_factor
@@ -49,7 +49,7 @@ def fitted(
     warn_if_surface_is_lost(cloud, stacklevel=4)
     _check_criterion(criterion, near, radius, weights, robust)
     finite = cloud.finite
-    points = cloud.offsets[finite].astype(np.float64)
+    points = cloud.offsets[ALL if finite.all() else finite].astype(np.float64)
     if radius is not None and near is None and kind not in ("sphere", "cylinder", "circle"):
         raise InvalidInputError(
             f"radius is that of the ball around near: give near, too; a {kind} keeps none"
@@ -96,8 +96,10 @@ def _described(
     trimmed: bool,
 ) -> Surface:
     """Describe a shape fitted to the points chosen, less the origin; `trimmed`: without those far from it."""
-    covariance, across, freedom = known.uncertainty(primitive, points, chosen)
-    some, weights = points[chosen], known.of(chosen).weights
+    # All of them need not be copied.
+    some_of = ALL if chosen.all() else chosen
+    covariance, across, freedom = known.uncertainty(primitive, points, some_of)
+    some, weights = points[some_of], known.of(some_of).weights
     distances = primitive.distances(some)
     squares = distances**2
     # A point that does not count tells nothing of the deviation.

@@ -125,7 +125,7 @@ _CORNERS_OF = 10_000
 
 
 def _near_hull(flat: Array) -> Array:
-    """Leave out points (n, 2) that are well inside the polygon of the farthest of some: none is of the hull."""
+    """Leave out points (n, 2) inside the polygon of the farthest of some: none of them is of the hull."""
     some = flat[:: math.ceil(len(flat) / _CORNERS_OF)]
     angles = 2 * math.pi / _DIRECTIONS * np.arange(_DIRECTIONS)
     corners = some[(some @ np.stack([np.cos(angles), np.sin(angles)])).argmax(axis=0)]
@@ -138,4 +138,5 @@ def _near_hull(flat: Array) -> Array:
         # A corner that is there twice has no side.
         if side_x or side_y:
             inside &= side_y * x - side_x * y < side_y * corner_x - side_x * corner_y - margin
-    return flat[~inside]
+    left: Array = flat[~inside]
+    return left

@@ -114,8 +114,8 @@ class Surface:
     area: float
     """Of the part of it that has points, as an estimate."""
     members: NDArray[np.intp]
-    """The numbers of the points that it was fitted to, (m,), ascending; of a surface of `find_surfaces` all of
-    its points, also those at its borders, which it was not fitted to."""
+    """The numbers of the points that it was fitted to, (m,), ascending; of a surface of `find_surfaces` all
+    of its points, also those at its borders, which it was not fitted to."""
     rms: float
     """Root mean square of the members' distances."""
     deviation: float
