@@ -111,7 +111,7 @@ def _evidence(surface: Surface) -> float:
     """Give the probability that the surface is not of a simpler kind: that its radius is no chance."""
     from scipy.special import erf
 
-    sizes = [(surface.radius, surface.radius_std), (surface.half_angle, surface.half_angle_std)]
+    sizes = [(surface.fitted_radius, surface.radius_std), (surface.half_angle, surface.half_angle_std)]
     sizes.append((surface.major_radius, surface.major_radius_std))
     return float(
         np.prod([erf(abs(size) / (np.sqrt(2) * error)) for size, error in sizes if size and error > 0])

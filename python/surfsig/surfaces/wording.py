@@ -47,9 +47,11 @@ def run_rows(runs: Iterable[PipeRun]) -> list[tuple[str, ...]]:
 
 def _radius(surface: Surface) -> tuple[str, str]:
     """Write the radius and its interval with two digits of the error."""
-    if math.isnan(surface.radius):
+    if math.isnan(surface.fitted_radius):
         return "", ""
     low, high = surface.interval
+    if not surface.radius_determined:
+        return "not determined", f"above {low:.3g}" if low > 0 else ""
     if not high > low:
         return f"{surface.radius:.5g}", ""
     decimals = decimals_of(surface.radius, 0.5 * (high - low))

@@ -19,8 +19,8 @@ const FEWEST_POINTS: usize = 2;
 const MOST_CROSSING: f64 = 3.0;
 
 /// Standard errors by which small blocks must tell more than large ones for anything to cross the borders: of independent
-/// residuals of 400 points, what is told is then 1.03 on average, and without it 1.14.
-const SURELY: f64 = 1.5;
+/// residuals of 400 points, what is told is then 1.02 on average, and without it 1.14.
+const SURELY: f64 = 2.0;
 
 /// Points cut into blocks of neighbours, of which only whole ones count as independent.
 pub(super) struct Blocks {

@@ -17,11 +17,15 @@ use rustc_hash::{FxHashMap, FxHashSet};
 /// point next to one is as good as any.
 const MOST_OTHERS: usize = 2;
 
-/// A surface of which this part is not at a border is measured there. ...
+/// Part of the sum of both tolerances, of three deviations each, that a strip reaches from the border: beyond four
+/// deviations hardly a point is the other surface's. ...
+const REACH: f64 = 0.67;
+
+/// ... A surface of which this part is not at a border is measured there. ...
 const ENOUGH: f64 = 0.3;
 
 /// ... Where less is left, the strips are narrower by these factors, and at last there are none.
-const NARROWER: [f64; 4] = [1.0, 0.5, 0.25, 0.0];
+const NARROWER: [f64; 3] = [1.0, 0.5, 0.0];
 
 /// Fewest points that a surface is measured by, for each of its parameters.
 const FEWEST_FOR_PARAMETER: usize = 6;
@@ -110,7 +114,7 @@ fn along_border(
     border: &[u32],
     narrower: f64,
 ) -> FxHashSet<u32> {
-    let width = narrower * (limits[own].tolerance + limits[other].tolerance);
+    let width = narrower * REACH * (limits[own].tolerance + limits[other].tolerance);
     let is_near = |point: u32| {
         let foot = limits[own].foot(&scene.points[point as usize]);
         limits[other].chart.distance(&foot).abs() <= width
