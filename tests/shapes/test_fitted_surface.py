@@ -107,26 +107,20 @@ def test_a_surface_that_was_found_has_the_values_that_it_always_had(kind: Kind) 
 
 @pytest.mark.parametrize("kind", FITS)
 def test_both_describe_the_same_points_alike(kind: Kind) -> None:
-    """What does not depend on the point at which shifts are counted, or on the axis's sign."""
+    """But for the axis's sign."""
     (found,) = surfsig.find_surfaces(DRAWN[kind], kinds=[kind], min_points=200)
     fitted = FITS[kind](DRAWN[kind][found.members])
     assert type(fitted) is type(found) is Surface
-    names = [
-        "center",
-        "center_std",
-        "axis_std",
-        "radius",
-        "radius_std",
-        "length",
-        "width",
-        "arc",
-        "rms",
-        "deviation",
-    ]
-    # The degrees of freedom of a plane are those of its shift, at its point.
-    for name in names + ["degrees_of_freedom"] * (kind != "plane"):
+    names = ["center", "radius", "length", "width", "arc", "rms", "deviation"]
+    for name in (*names, "degrees_of_freedom"):
         ours, theirs = getattr(fitted, name), getattr(found, name)
         np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-7, err_msg=name)
+    for name in ("center_std", "axis_std", "radius_std"):
+        # A surface that was found left out the points far from it, which makes its errors a little larger.
+        ours, theirs = np.atleast_1d(getattr(fitted, name)), np.atleast_1d(getattr(found, name))
+        known = ours > 0
+        assert (theirs[known] >= ours[known] * (1 - 1e-9)).all(), name
+        assert (theirs[known] < 1.2 * ours[known]).all(), name
     np.testing.assert_allclose(abs(fitted.axis), abs(found.axis), atol=1e-7)
     # Cells of which the area is made begin at another end.
     assert fitted.area == pytest.approx(found.area, rel=0.03)
