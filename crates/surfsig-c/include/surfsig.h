@@ -308,6 +308,12 @@ typedef struct surfsig_options surfsig_options;
 typedef struct surfsig_primitive surfsig_primitive;
 
 /**
+ * What is known of a surface before surfsig_fit_primitive_with() fits it. Made by surfsig_primitive_options_new(), freed
+ * by surfsig_primitive_options_free().
+ */
+typedef struct surfsig_primitive_options surfsig_primitive_options;
+
+/**
  * How scans are registered. Made by surfsig_registration_options_new(), freed by surfsig_registration_options_free().
  */
 typedef struct surfsig_registration_options surfsig_registration_options;
@@ -1144,6 +1150,22 @@ surfsig_code surfsig_fit_primitive(const surfsig_cloud *cloud,
                                    surfsig_primitive **primitive);
 
 /**
+ * Fits a surface of which something is known, or to points that do not count alike: the sum of weighted squared
+ * orthogonal distances is least.
+ *
+ * SURFSIG_CODE_UNDETERMINED as for surfsig_fit_primitive(); points without weight do not count.
+ *
+ * @param cloud The points.
+ * @param kind A surfsig_surface_kind; any other number is SURFSIG_CODE_INVALID_INPUT.
+ * @param options What is known; null for nothing.
+ * @param primitive Where the result is put; null is put there where the call fails.
+ */
+surfsig_code surfsig_fit_primitive_with(const surfsig_cloud *cloud,
+                                        uint8_t kind,
+                                        const surfsig_primitive_options *options,
+                                        surfsig_primitive **primitive);
+
+/**
  * Frees a surface; does nothing with null.
  */
 void surfsig_primitive_free(surfsig_primitive *primitive);
@@ -1211,6 +1233,23 @@ surfsig_code surfsig_primitive_uncertainty(const surfsig_primitive *primitive,
                                            double *freedom);
 
 /**
+ * The same of a surface that surfsig_fit_primitive_with() fitted: what it kept has no variance and no covariance.
+ *
+ * @param primitive The surface.
+ * @param cloud The points that it was fitted to.
+ * @param options Those of the fit; null for none. The start means nothing here.
+ * @param covariance As for surfsig_primitive_uncertainty().
+ * @param across As for surfsig_primitive_uncertainty().
+ * @param freedom As for surfsig_primitive_uncertainty().
+ */
+surfsig_code surfsig_primitive_uncertainty_with(const surfsig_primitive *primitive,
+                                                const surfsig_cloud *cloud,
+                                                const surfsig_primitive_options *options,
+                                                double *covariance,
+                                                double *across,
+                                                double *freedom);
+
+/**
  * The standard error of a surface's radius (of a plane's offset) that the points' number promises if none err alike;
  * NaN where they do not determine the surface, and for null.
  *
@@ -1219,6 +1258,56 @@ surfsig_code surfsig_primitive_uncertainty(const surfsig_primitive *primitive,
  */
 double surfsig_primitive_independent_error(const surfsig_primitive *primitive,
                                            const surfsig_cloud *cloud);
+
+/**
+ * Makes options of the default values: everything is fitted, all points count alike.
+ */
+surfsig_primitive_options *surfsig_primitive_options_new(void);
+
+/**
+ * Frees options; does nothing with null.
+ */
+void surfsig_primitive_options_free(surfsig_primitive_options *options);
+
+/**
+ * Chooses the surface from which the fit begins.
+ *
+ * @param options The options to change.
+ * @param start A surface of the same kind near the points, which is copied; null to begin from what the points tell.
+ */
+surfsig_code surfsig_primitive_options_set_start(surfsig_primitive_options *options,
+                                                 const surfsig_primitive *start);
+
+/**
+ * Says by how much the squared distance of each point counts, such as one over the variance of its noise. Their common
+ * factor means nothing.
+ *
+ * @param options The options to change.
+ * @param weights Finite and not below 0; they are copied. Null for none: all points count alike.
+ * @param count How many they are: one for each point of the cloud; another number is an error of the fit.
+ */
+surfsig_code surfsig_primitive_options_set_weights(surfsig_primitive_options *options,
+                                                   const double *weights,
+                                                   size_t count);
+
+/**
+ * Gives the radius of a sphere, cylinder or circle, where it is known: only the rest is fitted.
+ *
+ * @param options The options to change.
+ * @param radius In the cloud's unit, finite; 0 to have it fitted. With another kind it is an error of the fit.
+ */
+surfsig_code surfsig_primitive_options_set_radius(surfsig_primitive_options *options,
+                                                  double radius);
+
+/**
+ * Gives the direction of the axis or normal, where it is known: only the rest is fitted.
+ *
+ * @param options The options to change.
+ * @param axis x, y, z, finite, of any length above 0; null to have it fitted. A sphere has none: it is then an error of
+ * the fit.
+ */
+surfsig_code surfsig_primitive_options_set_axis(surfsig_primitive_options *options,
+                                                const double *axis);
 
 /**
  * Makes options of the default values: the radius by the scans' size, 1,000 keypoints, all cores.
