@@ -210,9 +210,8 @@ mod tests {
     fn there_are_fewer_blocks_where_neighbours_err_alike() {
         let mut draws = Draws(16);
         let points = cube(400, &mut draws);
-        let count = |residuals: &[f64]| {
-            1 + *Blocks::of_residuals(&points, residuals, 3).labels.iter().max().unwrap()
-        };
+        let count =
+            |residuals: &[f64]| 1 + *Blocks::of_residuals(&points, residuals, 3).labels.iter().max().unwrap();
         let apart: Vec<f64> = points.iter().map(|_| draws.normal()).collect();
         assert_eq!(count(&apart), 32);
         let of_patch: Vec<f64> = (0..50).map(|_| draws.normal()).collect();

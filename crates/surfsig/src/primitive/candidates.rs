@@ -4,11 +4,11 @@
 //! near others across it. So the axes are spread over half the sphere, a few steps from each are made on a sample of
 //! the points, and the surfaces with the smallest sums are those to follow.
 
+use super::SurfaceKind;
 use super::conditions::{Conditions, PrimitiveFitOptions};
 use super::geometry::{Primitive, Vector};
 use super::least_squares::{Fitted, SCREENING, SLIDING, Termination, refine_with};
 use super::start::{bent, circle, fitted_to_moments, smallest, start, with_normals};
-use super::SurfaceKind;
 use crate::fit::spread_direction;
 use crate::geometry::axes_across;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector2};

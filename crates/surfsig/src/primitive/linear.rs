@@ -40,7 +40,8 @@ pub(super) fn visit_rows(
     mut visit: impl FnMut(&Row, f64),
 ) {
     let (chart, free) = (primitive.chart(), conditions.free_parameters());
-    let (is_curve, are_all_free) = (primitive.kind.components() > 1, free.len() == primitive.kind.parameters());
+    let (is_curve, are_all_free) =
+        (primitive.kind.components() > 1, free.len() == primitive.kind.parameters());
     let mut visit_component = |number: usize, (distance, by): (f64, Row)| {
         if conditions.weights.is_none() && are_all_free {
             return visit(&by, distance);
@@ -176,7 +177,9 @@ impl Triangle {
             let scale = 1.0 / (corner - length);
             reflected.iter_mut().for_each(|entry| *entry *= scale);
             self.entries[k][k] = length;
-            for (column, entry) in after.iter_mut().zip(&mut self.entries[k][k + 1..]).take(self.width - k - 1) {
+            for (column, entry) in
+                after.iter_mut().zip(&mut self.entries[k][k + 1..]).take(self.width - k - 1)
+            {
                 let along = factor * (*entry + dot(reflected, column));
                 *entry -= along;
                 column.iter_mut().zip(reflected.iter()).for_each(|(c, v)| *c -= along * v);

@@ -117,9 +117,9 @@ fn least(starts: &[Primitive], points: &[Vector], extent: f64, conditions: &Cond
     let (some, weights) = sample(points, conditions.weights, MANY);
     let some_conditions = Conditions { weights: weights.as_deref(), ..*conditions };
     let beside = |primitive: &Primitive| primitive.beside(&Vector::zeros());
-    let fits = starts.iter().filter_map(|start| {
-        refine_with(beside(start), &some, extent, &some_conditions, EXHAUSTIVE)
-    });
+    let fits = starts
+        .iter()
+        .filter_map(|start| refine_with(beside(start), &some, extent, &some_conditions, EXHAUSTIVE));
     let fits = distinct(fits.collect(), extent);
     let near = if some.len() == points.len() || fits.len() == 1 {
         fits.into_iter().next()?.primitive

@@ -173,7 +173,11 @@ impl Primitive {
         let found = if options.are_valid(self.kind, points.len()) {
             let (points, weights) = options.counted(points);
             let options = PrimitiveFitOptions { weights: weights.as_deref(), ..*options };
-            uncertainty_with(&self.shifted(&-self.point), &self.local(&points), &options.conditions(self.kind))
+            uncertainty_with(
+                &self.shifted(&-self.point),
+                &self.local(&points),
+                &options.conditions(self.kind),
+            )
         } else {
             None
         };
@@ -206,8 +210,8 @@ impl Primitive {
 
 #[cfg(test)]
 mod tests {
-    use super::super::least_squares::{EXACT, refine};
     use super::super::blocks::spatial_blocks;
+    use super::super::least_squares::{EXACT, refine};
     use super::super::linear::tests::of_rows;
     use super::super::{SurfaceKind, fit_primitive};
     use super::*;

@@ -6,9 +6,9 @@
 //! radii. So a strip along each border is left out, as wide as the noise of both surfaces reaches. What is left out is
 //! told by the place on the surface below a point, and not by the point's own distance, which would choose by noise.
 
+use super::FoundSurface;
 use super::growth::Region;
 use super::scene::{NONE, Scene};
-use super::FoundSurface;
 use crate::primitive::{Chart, Primitive, SurfaceKind, Uncertainty, Vector, fit_primitive, uncertainty};
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -46,7 +46,8 @@ pub(super) fn measured(scene: &Scene, kinds: &[SurfaceKind], regions: &[Region])
         .map(|region| Limit { chart: region.primitive.chart(), tolerance: region.tolerance(scene) })
         .collect();
     let described = |(number, region): (usize, &Region)| {
-        let mut inner = Region { members: certain(scene, &limits, number, &region.members), ..region.clone() };
+        let mut inner =
+            Region { members: certain(scene, &limits, number, &region.members), ..region.clone() };
         let mut found = fitted(&mut inner, scene, limits[number].tolerance);
         while let Some(simpler) = insignificant(&found).filter(|simpler| kinds.contains(simpler)) {
             let Some(mut as_smooth) = inner.of_kind(simpler, scene) else { break };
