@@ -92,7 +92,8 @@ fn crossing(count: usize, blocks: usize, effects: &[(usize, f64)]) -> f64 {
         }
         let [n, x, xx, y, xy] = sums;
         let determinant = n * xx - x * x;
-        if !(determinant > 1e-9 * n * xx) {
+        // Not a number where no residual is left.
+        if determinant.is_nan() || determinant <= 1e-9 * n * xx {
             return 1.0;
         }
         (whole, slope) = ((xx * y - x * xy) / determinant, (n * xy - x * y) / determinant);

@@ -4,6 +4,9 @@ use super::SurfaceKind;
 use super::geometry::{MOST_PARAMETERS, Primitive, Vector};
 use std::borrow::Cow;
 
+/// The weights of some points.
+type Weights<'a> = Cow<'a, [f64]>;
+
 /// What is known of a surface before [`crate::fit_primitive_with`] fits it.
 ///
 /// ```
@@ -46,7 +49,7 @@ impl PrimitiveFitOptions<'_> {
     pub(super) fn counted<'a>(
         &'a self,
         points: &'a [[f64; 3]],
-    ) -> (Cow<'a, [[f64; 3]]>, Option<Cow<'a, [f64]>>) {
+    ) -> (Cow<'a, [[f64; 3]]>, Option<Weights<'a>>) {
         match self.weights {
             Some(weights) if weights.contains(&0.0) => {
                 let counted = || (0..points.len()).filter(|&i| weights[i] > 0.0);
