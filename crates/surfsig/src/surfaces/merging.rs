@@ -69,8 +69,9 @@ fn joined(scene: &Scene, large: &Region, small: &Region) -> Option<Region> {
         let mut joined =
             Region { members: members.clone(), noise: large.noise.max(small.noise), ..of_kind.clone() };
         joined.fit(scene, SAMPLE)?;
-        // Among many points few do not show how far they are from the surface.
-        let is_near = joined.root_mean_square(&small.members, scene) <= NEAR * joined.noise + scene.floor;
+        // Among many points few do not show how far they are from the surface. Those that err alike may be far from it.
+        let is_near = scene.likeness.alike > 1.0
+            || joined.root_mean_square(&small.members, scene) <= NEAR * joined.noise + scene.floor;
         (is_near && joined.is_smooth(scene) && joined.is_plausible(scene)).then_some(joined)
     })
 }

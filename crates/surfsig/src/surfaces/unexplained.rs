@@ -79,10 +79,8 @@ pub(super) fn add(
         let mut passes = 0..PASSES;
         while passes.next().is_some() && add_among_left(Search::Exact(neighbours), evidence.small)? {}
     }
-    if kinds.contains(&SurfaceKind::Plane) {
-        if add_among_left(Search::Planes, evidence.small)? {
-            add_among_left(Search::Exact(FEW_LOCAL), evidence.small)?;
-        }
+    if kinds.contains(&SurfaceKind::Plane) && add_among_left(Search::Planes, evidence.small)? {
+        add_among_left(Search::Exact(FEW_LOCAL), evidence.small)?;
     }
     add_among_left(Search::Measured, measured)?;
     Ok(regions.len() > before)
