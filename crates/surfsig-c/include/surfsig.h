@@ -1424,7 +1424,8 @@ void surfsig_surface_options_free(surfsig_surface_options *options);
  * Chooses the fewest points of a surface.
  *
  * @param options The options to change.
- * @param points At least 1; 0 for the default: a five-hundredth of all, from 20 to 1,000.
+ * @param points At least 1; 0 for the default: a five-hundredth of all, from 20 to 1,000, and
+ * fewer of surfaces that end at edges.
  */
 surfsig_code surfsig_surface_options_set_min_points(surfsig_surface_options *options, uint32_t points);
 

@@ -30,7 +30,8 @@ pub extern "C" fn surfsig_surface_options_free(options: Option<Box<surfsig_surfa
 /// Chooses the fewest points of a surface.
 ///
 /// @param options The options to change.
-/// @param points At least 1; 0 for the default: a five-hundredth of all, from 20 to 1,000.
+/// @param points At least 1; 0 for the default: a five-hundredth of all, from 20 to 1,000, and
+/// fewer of surfaces that end at edges.
 #[unsafe(no_mangle)]
 pub extern "C" fn surfsig_surface_options_set_min_points(
     options: Option<&mut surfsig_surface_options>,

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     "--min-points",
     type=int,
     metavar="N",
-    help="Fewest points of a surface.  [default: 1/500 of all, 20 to 1000]",
+    help="Fewest points of a surface.  [default: 1/500 of all, 20 to 1000; fewer of what ends at edges]",
 )
 @click.option(
     "--noise",

@@ -30,7 +30,9 @@ def find_surfaces(
     """Find the planes, spheres, cylinders, cones and tori of a scan, with their sizes and errors.
 
     Surfaces grow from the smoothest points on, over neighbouring points that are within the noise around
-    them; the simplest kind that explains its points wins. Nothing needs to be set, and nothing is left to
+    them; the simplest kind that explains its points wins. Pieces that a shadow or a gap cuts are one surface
+    where one fit explains them as well as two; two sheets are two from a separation of five times the noise
+    on. Nothing needs to be set, and nothing is left to
     chance: the result is always the same.
 
     At last each surface is fitted again as `surfsig.fit_sphere` and its like do, without a strip along its
@@ -44,7 +46,9 @@ def find_surfaces(
         A `PointCloud`, an array (n, 3) of numbers, or any other that `PointCloud.of` takes (Open3D, pandas,
         ...). Points that are not finite belong to no surface.
     min_points
-        Fewest points of a surface; by default a five-hundredth of all, from 20 to 1,000.
+        Fewest points of a surface. By default a five-hundredth of all, from 20 to 1,000; and fewer where a
+        surface ends at edges, as none does that is part of a free form: from 20 (plane) to 36 (torus) that
+        err each for itself, or 10 to 26 where there is no noise.
     noise
         Standard deviation of the points' distances from the surfaces, in the cloud's own unit; by default
         estimated around each point.

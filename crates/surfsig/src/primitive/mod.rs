@@ -20,7 +20,7 @@ pub use geometry::Primitive;
 pub(crate) use geometry::{Chart, Vector, extent};
 pub use kind::SurfaceKind;
 pub(crate) use least_squares::{EXACT, QUICK, Termination, refine};
-pub(crate) use start::{bent, start};
+pub(crate) use start::{bent, smallest, start};
 pub use uncertainty::PrimitiveUncertainty;
 pub(crate) use uncertainty::{Uncertainty, uncertainty};
 

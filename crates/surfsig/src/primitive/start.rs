@@ -133,7 +133,7 @@ pub(crate) fn bent(simpler: &Primitive, kind: SurfaceKind, extent: f64) -> Vec<P
 }
 
 /// The eigenvector of the smallest eigenvalue.
-pub(super) fn smallest(matrix: &Matrix3<f64>) -> Option<Vector> {
+pub(crate) fn smallest(matrix: &Matrix3<f64>) -> Option<Vector> {
     if !matrix.iter().all(|entry| entry.is_finite()) {
         return None;
     }

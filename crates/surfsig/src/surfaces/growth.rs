@@ -1,5 +1,6 @@
 //! A surface that grows over its neighbours.
 
+use super::evidence::Evidence;
 use super::scene::{Scene, Stamps};
 use crate::primitive::{
     EXACT, Primitive, QUICK, SurfaceKind, Termination, Vector, bent, extent, refine, start,
@@ -7,7 +8,7 @@ use crate::primitive::{
 use nalgebra::Matrix3;
 
 /// Points that every surface has.
-const FEW: usize = 12;
+const FEW: usize = 8;
 
 /// Points that tell which surface goes through a seed's first points.
 const SAMPLE_OF_FIRST: usize = 48;
@@ -65,13 +66,13 @@ const ENOUGH: f64 = 1.3;
 
 /// Cosine of the angle between the surface's normal and that of a point's surroundings up to which the point may
 /// belong to it. Without noise distances tell all, and normals at edges nothing.
-const ALONG: f64 = 0.9;
+pub(super) const ALONG: f64 = 0.9;
 
 /// Evidence, in units of the logarithm of likelihood, for a parameter more.
 const EVIDENCE: f64 = 10.0;
 
 impl Scene {
-    fn termination(&self, noise: f64) -> Termination {
+    pub(super) fn termination(&self, noise: f64) -> Termination {
         if self.is_noiseless(noise) { EXACT } else { QUICK }
     }
 }
@@ -91,7 +92,7 @@ pub(super) struct Region {
 pub(super) struct Grower<'a> {
     pub scene: &'a Scene,
     pub kinds: &'a [SurfaceKind],
-    pub fewest: usize,
+    pub evidence: Evidence,
     /// Points around a seed from which a surface begins.
     pub first: usize,
     /// Points at which a surface is large enough.
@@ -104,13 +105,17 @@ impl Grower<'_> {
     /// The surface that grows from a seed, or the points that were tried.
     pub fn region_around(&mut self, seed: u32) -> Result<Region, Vec<u32>> {
         let region = self.largest_around(seed)?;
-        let found = region.is_smooth(self.scene) && region.members.len() >= self.fewest;
-        if found { Ok(region) } else { Err(region.members) }
+        if self.counts(&region) { Ok(region) } else { Err(region.members) }
+    }
+
+    /// Whether a surface is smooth and counts.
+    pub fn counts(&mut self, region: &Region) -> bool {
+        region.is_smooth(self.scene) && self.evidence.counts(region, self.scene, self.inside)
     }
 
     /// The surface that grows from a seed, smooth or not.
     pub fn largest_around(&mut self, seed: u32) -> Result<Region, Vec<u32>> {
-        let first = self.scene.around(seed, self.first, self.seen);
+        let first = self.scene.first_around(seed, self.first, self.seen);
         let noise = self.scene.noise_around(seed, self.seen);
         let mut best: Option<Region> = None;
         // Where no quadric explains a place, none of these surfaces does.
@@ -123,7 +128,7 @@ impl Grower<'_> {
         }
         for &kind in self.kinds {
             let Some(simpler) = best.as_ref().filter(|best| best.primitive.kind < kind) else { continue };
-            if simpler.deviation <= self.scene.floor || simpler.members.len() < self.fewest / SMALL {
+            if simpler.deviation <= self.scene.floor || simpler.members.len() < self.evidence.small / SMALL {
                 break;
             }
             // The points of the simpler surface are chosen to be near it; those around the seed are not.
@@ -172,7 +177,7 @@ impl Grower<'_> {
     }
 
     /// Grows a surface from some points: fits, takes the near points that hang together, and fits again.
-    fn grow(&mut self, start: Primitive, from: &[u32], noise: f64) -> Option<Region> {
+    pub fn grow(&mut self, start: Primitive, from: &[u32], noise: f64) -> Option<Region> {
         let scene = self.scene;
         let mut region = Region { primitive: start, members: from.to_vec(), deviation: 0.0, noise };
         let mut stable_rounds = 0;
@@ -256,6 +261,14 @@ impl Region {
         let mut region = Self { primitive: start(kind, &points, &normals)?, ..self.clone() };
         region.fit(scene, usize::MAX)?;
         region.is_smooth(scene).then_some(region)
+    }
+
+    /// Root mean square of some points' distances from the surface.
+    pub fn root_mean_square(&self, points: &[u32], scene: &Scene) -> f64 {
+        let chart = self.primitive.chart();
+        let squares: f64 =
+            points.iter().map(|&point| chart.distance(&scene.points[point as usize]).powi(2)).sum();
+        (squares / points.len() as f64).sqrt()
     }
 
     /// Distance from the surface up to which points belong to it.

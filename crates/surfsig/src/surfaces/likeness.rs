@@ -6,7 +6,7 @@
 use super::growth::Region;
 use super::scene::Scene;
 use crate::primitive::{Vector, design_effect};
-use crate::statistics::upper_median;
+use crate::statistics::{quantile, upper_median};
 
 /// Surfaces that are grown on trial, from seeds spread evenly over those whose noise is from a tenth to six tenths.
 const TRIALS: usize = 48;
@@ -25,6 +25,15 @@ const BLOCK: usize = 50;
 
 /// Fewest points that err as one from which they count as alike at all.
 const ALIKE: f64 = 2.0;
+
+/// Points of a trial that tells how large noise is.
+const LARGE: usize = 300;
+
+/// Ratio of the deviations that three quarters and a tenth of the large trials stay below, up to which noise is the same everywhere.
+const HOMOGENEOUS: f64 = 1.3;
+
+/// Fewest large trials that tell so.
+const FEWEST_LARGE: usize = 5;
 
 /// Rounds, and the ratio at which they end.
 const ROUNDS: usize = 5;
@@ -55,11 +64,15 @@ pub(super) fn learn(
     for round in 0..ROUNDS {
         let mut deviations = Vec::new();
         let mut alike = Vec::new();
+        let mut large = Vec::new();
         for &seed in seeds[first..last].iter().step_by(step) {
             let Some(region) = grower(scene, seed, ENOUGH) else { continue };
             if region.members.len() >= LEAST && !scene.is_noiseless(region.noise) {
                 deviations.push(region.deviation / region.noise);
                 alike.push(points_as_one(scene, &region));
+                if region.members.len() >= LARGE {
+                    large.push(region.deviation);
+                }
             }
         }
         if deviations.len() < FEWEST {
@@ -68,6 +81,7 @@ pub(super) fn learn(
         let (deviation, alike) =
             (upper_median(deviations).unwrap_or(1.0), upper_median(alike).unwrap_or(1.0));
         if alike < ALIKE {
+            scene.common_noise = common_noise(large);
             return true;
         }
         scene.likeness.alike = alike;
@@ -79,10 +93,31 @@ pub(super) fn learn(
     true
 }
 
+/// The noise that large surfaces have in common, if they have; infinite where it differs.
+fn common_noise(mut deviations: Vec<f64>) -> f64 {
+    if deviations.len() < FEWEST_LARGE {
+        return f64::INFINITY;
+    }
+    let [low, middle, high] = [0.1, 0.5, 0.75].map(|share| quantile(&mut deviations, share));
+    if high <= HOMOGENEOUS * low { middle } else { f64::INFINITY }
+}
+
 /// How many points of a surface count as one.
 fn points_as_one(scene: &Scene, region: &Region) -> f64 {
     let points: Vec<Vector> = region.members.iter().map(|&member| scene.points[member as usize]).collect();
     let chart = region.primitive.chart();
     let residuals: Vec<f64> = points.iter().map(|point| chart.distance(point)).collect();
     design_effect(&points, &residuals, points.len().div_ceil(BLOCK))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_common_where_it_hardly_differs() {
+        assert_eq!(common_noise(vec![1.0, 1.1, 1.2, 1.05, 1.1]), 1.1);
+        assert_eq!(common_noise(vec![1.0, 1.1, 2.0, 3.0, 1.1]), f64::INFINITY);
+        assert_eq!(common_noise(vec![1.0; 4]), f64::INFINITY);
+    }
 }

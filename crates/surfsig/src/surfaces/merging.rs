@@ -10,6 +10,9 @@ const TOUCHING: usize = 8;
 /// Points that tell whether two surfaces are one.
 const SAMPLE: usize = 2000;
 
+/// Root mean square of the smaller one's distances from the joint surface, in units of noise, up to which they are one.
+const NEAR: f64 = 2.0;
+
 /// Rounds in which points that are left join the surfaces next to them.
 const ROUNDS: usize = 4;
 
@@ -66,7 +69,10 @@ fn joined(scene: &Scene, large: &Region, small: &Region) -> Option<Region> {
         let mut joined =
             Region { members: members.clone(), noise: large.noise.max(small.noise), ..of_kind.clone() };
         joined.fit(scene, SAMPLE)?;
-        (joined.is_smooth(scene) && joined.is_plausible(scene)).then_some(joined)
+        // Among many points few do not show how far they are from the surface. Those that err alike may be far from it.
+        let is_near = scene.likeness.alike > 1.0
+            || joined.root_mean_square(&small.members, scene) <= NEAR * joined.noise + scene.floor;
+        (is_near && joined.is_smooth(scene) && joined.is_plausible(scene)).then_some(joined)
     })
 }
 

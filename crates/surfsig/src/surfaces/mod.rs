@@ -1,25 +1,32 @@
 //! Which parts of a scan are planes, spheres, cylinders, cones and tori.
 //!
-//! [`scene`] knows each point's neighbours, normal and noise ([`surroundings`]); [`growth`] lets a [`crate::Primitive`] grow, [`merging`]
-//! joins what is one and shares out what lies between; [`unexplained`] looks again among the points that are left;
-//! [`measurement`] says what each surface measures.
+//! [`scene`] knows each point's neighbours, normal and noise ([`surroundings`], [`sheets`]); [`growth`] lets a
+//! [`crate::Primitive`] grow, [`evidence`] says whether it counts, [`merging`] joins what is one and shares out what lies
+//! between; [`unexplained`] looks again among the points that are left, by [`consensus`] at last; [`kinds`] tries what has
+//! grown among noise as other kinds, [`pieces`] joins what does not touch, and [`measurement`] says what each surface
+//! measures.
 
+mod consensus;
+mod evidence;
 mod graph;
 mod growth;
+mod kinds;
 mod likeness;
 mod measurement;
 mod merging;
+mod pieces;
 mod scene;
+mod sheets;
 mod surroundings;
 mod unexplained;
 
 use crate::primitive::SurfaceKind;
 use crate::{Error, Monitor, PointCloud, with_threads};
+use evidence::Evidence;
 use growth::{Grower, Region};
 use scene::{LOCAL, NONE, Scene, Stamps};
 
-/// Fewer points are no surface, unless somebody says so.
-pub const FEWEST_SURFACE_POINTS: usize = 20;
+pub use evidence::FEWEST_SURFACE_POINTS;
 
 /// Seeds of which surfaces begin; of larger clouds not every point is one.
 const MOST_SEEDS: usize = 100_000;
@@ -35,7 +42,8 @@ const LEVELS: [usize; 3] = [LOCAL, 4 * LOCAL, 16 * LOCAL];
 /// ```
 #[derive(Debug, Clone, Default)]
 pub struct SurfaceOptions {
-    /// Fewest points of a surface; a five-hundredth of all, from 20 to 1,000, where it is `None`.
+    /// Fewest points of a surface. Where it is `None`, a five-hundredth of all, from 20 to 1,000, and fewer, from 20
+    /// (plane) to 36 (torus) that err each for itself, of surfaces that end at edges.
     pub fewest: Option<usize>,
     /// Standard deviation of the points' distances; estimated around each point where it is `None`.
     pub noise: Option<f64>,
@@ -117,25 +125,29 @@ pub fn find_surfaces(
         let Some(mut scene) = Scene::new(cloud, options.noise, LOCAL, None, monitor)? else {
             return Ok(FoundSurfaces { labels: vec![NONE; cloud.len()], surfaces: Vec::new() });
         };
-        let fewest =
-            options.fewest.unwrap_or_else(|| (scene.points.len() / 500).clamp(FEWEST_SURFACE_POINTS, 1000));
+        let evidence = Evidence::new(options.fewest, &scene);
         // The simplest first, in whatever order they were asked for.
         let wanted = |kind: &SurfaceKind| options.kinds.is_empty() || options.kinds.contains(kind);
         let kinds: Vec<SurfaceKind> = SurfaceKind::ALL.into_iter().filter(wanted).collect();
         // Without noise neighbours do not err together.
         let levels = if scene.is_exact { &LEVELS[..1] } else { &LEVELS[..] };
-        let mut regions = regions(&mut scene, &kinds, fewest, levels, monitor)?;
-        let share_out = |scene: &mut Scene, regions: &mut Vec<Region>| {
+        let mut regions = regions(&mut scene, &kinds, evidence, levels, monitor)?;
+        let mut inside = Stamps::new(scene.points.len());
+        let mut share_out = |scene: &mut Scene, regions: &mut Vec<Region>| {
             merging::merge(scene, regions);
             merging::assign(scene, regions);
             // Some may have lost their points to a nearer one.
-            regions.retain(|region| region.members.len() >= fewest);
+            regions.retain(|region| evidence.counts(region, scene, &mut inside));
             merging::relabel(scene, regions);
         };
         share_out(&mut scene, &mut regions);
-        if unexplained::add(&mut scene, &mut regions, &kinds, fewest, monitor)? {
+        if unexplained::add(&mut scene, &mut regions, &kinds, evidence, monitor)? {
             share_out(&mut scene, &mut regions);
         }
+        if !scene.is_exact && self::kinds::try_again(&mut scene, &mut regions, &kinds, evidence) {
+            share_out(&mut scene, &mut regions);
+        }
+        pieces::join(&mut scene, &mut regions);
         Ok(assembled(cloud.len(), scene, &kinds, regions))
     })?
 }
@@ -144,7 +156,7 @@ pub fn find_surfaces(
 fn regions(
     scene: &mut Scene,
     kinds: &[SurfaceKind],
-    fewest: usize,
+    evidence: Evidence,
     levels: &[usize],
     monitor: &Monitor,
 ) -> Result<Vec<Region>, Error> {
@@ -163,7 +175,8 @@ fn regions(
         if unknown {
             unknown = !likeness::learn(scene, &seeds, |scene, seed, enough| {
                 let (seen, inside) = (&mut seen, &mut inside);
-                Grower { scene, kinds, fewest: enough / 40, first: level, enough, seen, inside }
+                let evidence = Evidence::of(enough / 40);
+                Grower { scene, kinds, evidence, first: level, enough, seen, inside }
                     .largest_around(seed)
                     .ok()
             });
@@ -178,7 +191,7 @@ fn regions(
             let mut grower = Grower {
                 scene,
                 kinds,
-                fewest,
+                evidence,
                 first: level,
                 enough: usize::MAX,
                 seen: &mut seen,

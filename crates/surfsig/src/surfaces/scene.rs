@@ -2,6 +2,7 @@
 
 use super::graph::Graph;
 use super::likeness::Likeness;
+use super::sheets::{self, Sheets};
 use super::surroundings::{Surroundings, around, is_line};
 use crate::fit::FitUsed;
 use crate::primitive::{Chart, Vector};
@@ -70,6 +71,8 @@ pub(super) struct Scene {
     pub is_exact: bool,
     /// Standard deviations of the nearest points from those surfaces; infinite where there is none.
     pub noise: Vec<f64>,
+    /// Whether they are known of the point's own sheet, of two that are near each other.
+    pub is_on_sheet: Vec<bool>,
     pub graph: Graph,
     /// Points among which surfaces grow, ascending: all, or one of each clump.
     pub chosen: Vec<u32>,
@@ -77,6 +80,9 @@ pub(super) struct Scene {
     pub floor: f64,
     pub labels: Vec<i32>,
     pub likeness: Likeness,
+    /// Noise that is the same everywhere; infinite where none is known. Where faces are small, the nearest points of all
+    /// are partly another face's, and noise around them seems larger.
+    pub common_noise: f64,
 }
 
 impl Scene {
@@ -110,6 +116,7 @@ impl Scene {
             known: noise,
             is_exact: false,
             noise: vec![f64::INFINITY; points.len()],
+            is_on_sheet: vec![false; points.len()],
             normals: vec![Vector::repeat(f64::NAN); points.len()],
             labels: vec![NONE; points.len()],
             points,
@@ -119,6 +126,7 @@ impl Scene {
             chosen,
             floor: FLOOR * spacing.max(1e-2 * typical),
             likeness: Likeness::NONE,
+            common_noise: f64::INFINITY,
         };
         let chosen = scene.chosen.clone();
         scene.learn(&local, &chosen);
@@ -126,6 +134,7 @@ impl Scene {
         if noise.is_none() && !scene.is_exact {
             scene.look_across_steps(monitor)?;
         }
+        sheets::tell_apart(&mut scene);
         Ok(Some(scene))
     }
 
@@ -196,8 +205,13 @@ impl Scene {
         Self::new(&PointCloud::new_f64(&positions), self.known, neighbours, Some(is_exact), monitor)
     }
 
+    /// Distance up to which points without noise are on a surface.
+    pub fn exact_reach(&self) -> f64 {
+        NOISELESS * self.floor
+    }
+
     pub fn is_noiseless(&self, noise: f64) -> bool {
-        noise <= NOISELESS * self.floor
+        noise <= self.exact_reach()
     }
 
     /// Takes over normals and noise of some points.
@@ -212,6 +226,30 @@ impl Scene {
             let normal = local.normals[entry].map(f64::from);
             self.normals[point] = if known { Vector::from(normal) } else { Vector::repeat(f64::NAN) };
         }
+    }
+
+    /// Takes over the normal and the noise of a point's own sheet, of two that are farther apart than noise.
+    pub fn set_sheet(&mut self, point: u32, sheets: &Sheets) {
+        let noise = self.known.unwrap_or(sheets.noise);
+        if sheets.are_apart(noise) && (!self.is_exact || self.is_noiseless(noise)) {
+            let point = point as usize;
+            self.noise[point] = noise;
+            self.normals[point] = sheets.normal;
+            self.is_on_sheet[point] = true;
+        }
+    }
+
+    /// So many unlabelled points around a seed from which a surface begins, of its own sheet only where there are two.
+    pub fn first_around(&self, seed: u32, most: usize, seen: &mut Stamps) -> Vec<u32> {
+        let index = seed as usize;
+        if !self.is_on_sheet[index] {
+            return self.around(seed, most, seen);
+        }
+        let of_both = self.around(seed, 2 * most, seen);
+        let from =
+            |&point: &u32| (self.points[point as usize] - self.points[index]).dot(&self.normals[index]);
+        let reach = sheets::REACH * self.noise[index] + self.floor;
+        of_both.into_iter().filter(|point| from(point).abs() <= reach).collect()
     }
 
     /// The first unlabelled points that are found from one on, over neighbours: at most so many.
@@ -320,7 +358,9 @@ impl Scene {
             return f64::INFINITY;
         }
         let quarter = noise.len() / 4;
-        self.likeness.spread * QUARTER * *noise.select_nth_unstable_by(quarter, f64::total_cmp).1
+        let around =
+            self.likeness.spread * QUARTER * *noise.select_nth_unstable_by(quarter, f64::total_cmp).1;
+        around.min(self.common_noise)
     }
 }
 

@@ -4,8 +4,9 @@
 //! are known, the points that are left are looked at without them: neighbours, normals and noise are those of these
 //! points alone, and at last of fewer neighbours.
 
-use super::growth::Region;
-use super::scene::{FEW_LOCAL, LOCAL, NONE, Scene};
+use super::evidence::Evidence;
+use super::growth::{Grower, Region};
+use super::scene::{FEW_LOCAL, LOCAL, NONE, Scene, Stamps};
 use crate::primitive::SurfaceKind;
 use crate::{Error, Monitor};
 
@@ -18,28 +19,47 @@ const PASSES: usize = 2;
 /// One point in so many that exact surfaces leave is enough for measured points among exact ones.
 const MEASURED_SHARE: usize = 4;
 
+/// How surfaces are looked for among what is left.
+#[derive(Clone, Copy)]
+enum Search {
+    /// Surfaces without noise, with so many nearest points for normals.
+    Exact(usize),
+    /// Planes without noise through three points and others.
+    Planes,
+    /// Surfaces with noise.
+    Measured,
+}
+
 /// Adds surfaces; tells whether there are any. Only where there is no noise: points that noise took away from a surface
 /// that was found would seem to be one of their own.
 pub(super) fn add(
     scene: &mut Scene,
     regions: &mut Vec<Region>,
     kinds: &[SurfaceKind],
-    fewest: usize,
+    evidence: Evidence,
     monitor: &Monitor,
 ) -> Result<bool, Error> {
     if !scene.is_exact {
         return Ok(false);
     }
     let before = regions.len();
-    let measured = scene.chosen.len().div_ceil(MEASURED_SHARE).max(fewest);
-    let mut add_among_left = |neighbours: usize, least: usize, is_exact: bool| -> Result<bool, Error> {
+    let measured = scene.chosen.len().div_ceil(MEASURED_SHARE).max(evidence.small);
+    let mut add_among_left = |search: Search, least: usize| -> Result<bool, Error> {
         let is_left = |&point: &u32| scene.labels[point as usize] == NONE;
         let left: Vec<u32> = scene.chosen.iter().copied().filter(is_left).collect();
         if left.len() < least {
             return Ok(false);
         }
+        let (neighbours, is_exact) = match search {
+            Search::Exact(neighbours) => (neighbours, true),
+            Search::Planes => (FEW_LOCAL, true),
+            Search::Measured => (LOCAL, false),
+        };
         let Some(mut apart) = scene.apart(&left, neighbours, is_exact, monitor)? else { return Ok(false) };
-        let found = super::regions(&mut apart, kinds, fewest, &[neighbours], monitor)?;
+        let found = match search {
+            Search::Planes => planes(&mut apart, evidence, monitor)?,
+            _ => super::regions(&mut apart, kinds, evidence, &[neighbours], monitor)?,
+        };
         let is_any = !found.is_empty();
         for mut region in found {
             region.primitive.point += apart.origin;
@@ -57,8 +77,35 @@ pub(super) fn add(
     };
     for neighbours in NEIGHBOURS {
         let mut passes = 0..PASSES;
-        while passes.next().is_some() && add_among_left(neighbours, fewest, true)? {}
+        while passes.next().is_some() && add_among_left(Search::Exact(neighbours), evidence.small)? {}
     }
-    add_among_left(LOCAL, measured, false)?;
+    if kinds.contains(&SurfaceKind::Plane) && add_among_left(Search::Planes, evidence.small)? {
+        add_among_left(Search::Exact(FEW_LOCAL), evidence.small)?;
+    }
+    add_among_left(Search::Measured, measured)?;
     Ok(regions.len() > before)
+}
+
+/// Planes through few points.
+fn planes(scene: &mut Scene, evidence: Evidence, monitor: &Monitor) -> Result<Vec<Region>, Error> {
+    let count = scene.points.len();
+    let (mut seen, mut inside) = (Stamps::new(count), Stamps::new(count));
+    let mut regions: Vec<Region> = Vec::new();
+    for seed in scene.chosen.clone() {
+        if scene.labels[seed as usize] != NONE {
+            continue;
+        }
+        monitor.check()?;
+        let (seen, inside) = (&mut seen, &mut inside);
+        let kinds = &[SurfaceKind::Plane];
+        let mut grower =
+            Grower { scene, kinds, evidence, first: FEW_LOCAL, enough: usize::MAX, seen, inside };
+        if let Some(region) = grower.plane_around(seed) {
+            for &member in &region.members {
+                scene.labels[member as usize] = regions.len() as i32;
+            }
+            regions.push(region);
+        }
+    }
+    Ok(regions)
 }
