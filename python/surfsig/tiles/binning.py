@@ -1,0 +1,192 @@
+"""Binning files into a store: two looks at all points, one after the other, in bounded memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfsig.errors import FileFormatError
+from surfsig.progress import ProgressCallback
+from surfsig.tiles.lock import locked
+from surfsig.tiles.plan import Plan, planned
+from surfsig.tiles.rows import Layout
+from surfsig.tiles.sampling import Sampling
+from surfsig.tiles.source import Source
+from surfsig.tiles.store import (
+    Blocks,
+    Store,
+    coordinates,
+    read_index,
+    removed,
+    rows_from,
+    rows_path,
+)
+from surfsig.tiles.survey import Survey, blocks_again, surveyed
+
+BLOCK_ROWS = 1 << 15
+"""Rows of a block that is read as one: some 2 MB, and a halo reads little that it does not need."""
+
+BUFFER_BYTES = 256 << 20
+"""Rows that wait in memory for their tiles' files; with fewer tiles, each gets larger pieces at a time."""
+
+Cut = Callable[[Survey], Plan]
+"""Makes the plan of the tiles once it is known where points are."""
+
+
+def cut_by_count(most_points: Callable[[int], int], tiles: int | None) -> Cut:
+    """Cut tiles of so many points, as the bytes of a row allow, and at least so many tiles."""
+    return lambda survey: planned(survey.cells, most_points(survey.row_bytes), tiles)
+
+
+def store_of(
+    source: Source,
+    folder: Path,
+    cut: Cut,
+    reading: ProgressCallback | None = None,
+    binning: ProgressCallback | None = None,
+    *,
+    same_plan: Callable[[Store], bool] = lambda store: True,
+) -> Store:
+    """Open the store of these files, or make it.
+
+    Parameters
+    ----------
+    source
+        The files.
+    folder
+        Where the store is or will be.
+    cut
+        Makes the plan.
+    reading, binning
+        Called with the bytes read so far and the size of all files, in the first look and the second.
+    same_plan
+        Whether a store of the same files can be used as it is.
+
+    Raises
+    ------
+    OSError, FileFormatError
+        If files cannot be read, or the store cannot be written.
+    """
+    fingerprint = source.fingerprint()
+    values = read_index(folder)
+    if values is not None and values["source"] == fingerprint:
+        store = Store.open(folder)
+        if store.is_whole() and same_plan(store):
+            return store
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder):
+        removed(folder)
+        survey = surveyed(source, reading)
+        store = _binned(survey, source, folder, cut(survey), binning)
+        if source.fingerprint() != fingerprint:
+            raise FileFormatError(f"{folder}: the input files changed while they were read")
+        store.write_index(fingerprint)
+    return store
+
+
+def _binned(
+    survey: Survey, source: Source, folder: Path, plan: Plan, progress: ProgressCallback | None
+) -> Store:
+    layouts = list(dict.fromkeys(survey.layouts))
+    layout_of_file = [layouts.index(layout) for layout in survey.layouts]
+    bins = _Bins(folder, layouts)
+    sampling = Sampling(survey.count, survey.finite)
+    finite = 0
+    counts = np.zeros(len(plan), np.int64)
+    number = 0
+    for file, cloud in blocks_again(survey, source.options, progress):
+        layout = layout_of_file[file]
+        if Layout.of(cloud) != layouts[layout]:
+            raise FileFormatError(f"{survey.files[file]}: changed while it was read")
+        points = np.asarray(cloud.points, np.float64)
+        finite += sampling.take(file, cloud, points, number, finite)
+        owners = plan.owners(points)
+        rows = layouts[layout].rows(cloud, np.arange(number, number + len(cloud), dtype=np.uint64), file)
+        number += len(cloud)
+        order = np.argsort(owners, kind="stable")
+        sizes = np.bincount(owners, minlength=len(plan))
+        counts += sizes
+        ends = np.cumsum(sizes)
+        for tile in np.flatnonzero(sizes):
+            bins.add(int(tile), layout, rows[order[ends[tile] - sizes[tile] : ends[tile]]])
+    if number != survey.count:
+        raise FileFormatError(f"{survey.files[0].parent}: the input files changed while they were read")
+    bins.flush()
+    origins = np.array([head.witnesses.origin for head in survey.heads])
+    for bin_number in range(len(plan)):
+        for layout, kind in enumerate(layouts):
+            _sort(rows_path(folder, bin_number, layout), kind, origins)
+    return Store(
+        folder,
+        plan,
+        tuple(counts.tolist()),
+        tuple(survey.heads),
+        tuple(layouts),
+        tuple(layout_of_file),
+        tuple(survey.unreadable),
+        sampling.facts(survey),
+    )
+
+
+class _Bins:
+    """Rows on the way to their tiles' files."""
+
+    def __init__(self, folder: Path, layouts: list[Layout]) -> None:
+        self._folder = folder
+        self._layouts = layouts
+        self._waiting: dict[tuple[int, int], list[NDArray[Any]]] = {}
+        self._bytes = 0
+
+    def add(self, tile: int, layout: int, rows: NDArray[Any]) -> None:
+        self._waiting.setdefault((tile, layout), []).append(rows)
+        self._bytes += rows.nbytes
+        if self._bytes > BUFFER_BYTES:
+            self.flush()
+
+    def flush(self) -> None:
+        for (tile, layout), parts in sorted(self._waiting.items()):
+            with rows_path(self._folder, tile, layout).open("ab") as file:
+                for rows in parts:
+                    file.write(rows.data)
+        self._waiting, self._bytes = {}, 0
+
+
+def _sort(path: Path, layout: Layout, origins: NDArray[np.float64]) -> None:
+    """Sort a tile's rows into blocks of neighbouring points, each in the order of the input."""
+    if not path.exists():
+        return
+    dtype = layout.dtype
+    rows = rows_from(path, dtype, 0, path.stat().st_size // dtype.itemsize)
+    points = coordinates(rows, origins)
+    starts, lowest, highest = [0], [], []
+    with path.open("r+b") as file:
+        for block in _blocks(points):
+            file.write(rows[block].data)
+            starts.append(starts[-1] + len(block))
+            lowest.append(np.fmin.reduce(points[block]))
+            highest.append(np.fmax.reduce(points[block]))
+    Blocks(np.array(starts), np.array(lowest), np.array(highest)).write(path)
+
+
+def _blocks(points: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+    """Cut points in two along their longest side until few are left; numbers ascend in each block."""
+    blocks, left = [], [np.arange(len(points))]
+    while left:
+        numbers = left.pop()
+        values = points[numbers]
+        cut = len(numbers) > BLOCK_ROWS
+        if cut:
+            with np.errstate(invalid="ignore"):
+                lengths = np.fmax.reduce(values) - np.fmin.reduce(values)
+            along = values[:, int(np.argmax(np.nan_to_num(lengths, posinf=0)))]
+            below = along < np.partition(along, len(along) // 2)[len(along) // 2]
+            cut = bool(below.any())
+        if cut:
+            left += [numbers[~below], numbers[below]]
+        else:
+            blocks.append(numbers)
+    return blocks
