@@ -134,17 +134,18 @@ impl Climb<'_> {
             let steps = (0..STEPS).map(|step| pass * (STEPS - 1) + step);
             let radii = steps.map(radius_of).collect::<Result<Vec<Radius>, Error>>()?;
             let balls = self.balls(&radii, &numbers)?;
+            // The axes of smaller balls begin with those of the largest.
+            let largest = radii[radii.len() - 1].get();
+            numbers.iter().for_each(|&query| self.reach[query] = self.reach[query].max(largest));
             let (mut lower, mut ended, mut best) = (Vec::new(), Vec::new(), vec![None; numbers.len()]);
             let mut place = 0..numbers.len();
             active.retain_mut(|(query, growth)| {
                 let place = place.next().expect("as many places as queries");
-                let reach = &mut self.reach[*query];
                 if pass == first && first > self.lowest && begins(&balls[0], place) {
-                    *reach = reach.max(balls[0].radius);
                     lower.push(*query);
                     return false;
                 }
-                let goes_on = growth.climb(&balls, place, &mut best[place], reach);
+                let goes_on = growth.climb(&balls, place, &mut best[place]);
                 if !goes_on || pass + 1 == first + PASSES {
                     ended.push((*query, growth.goes_back()));
                 }
@@ -232,17 +233,10 @@ impl Default for Growth {
 
 impl Growth {
     /// Notes the number of the best ball, if it is one of these, the smallest first; says whether the query may yet
-    /// take a larger one. `reach` becomes the largest radius that was looked at.
-    fn climb(
-        &mut self,
-        balls: &[Extraction],
-        place: usize,
-        best: &mut Option<usize>,
-        reach: &mut f64,
-    ) -> bool {
+    /// take a larger one.
+    fn climb(&mut self, balls: &[Extraction], place: usize, best: &mut Option<usize>) -> bool {
         let mut smaller = self.begun.then(|| Shown::of(&balls[0], place));
         for (number, ball) in balls.iter().enumerate().skip(usize::from(self.begun)) {
-            *reach = reach.max(ball.radius);
             if self.begun && ball.count[place] > MOST {
                 return false;
             }

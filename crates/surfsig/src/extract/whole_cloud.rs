@@ -124,8 +124,9 @@ mod tests {
     fn bits(found: &Extraction, query: usize) -> Vec<u32> {
         let numbers =
             [found.k1[query], found.k2[query], found.residual[query], found.radius_of(query) as f32];
-        let normal = found.normals[query];
-        numbers.into_iter().chain(normal).map(f32::to_bits).chain([found.count[query]]).collect()
+        let more = [found.condition[query], found.k1_std[query], found.planarity[query]];
+        let vectors = found.normals[query].into_iter().chain(found.directions[query]);
+        numbers.into_iter().chain(more).chain(vectors).map(f32::to_bits).chain([found.count[query]]).collect()
     }
 
     #[test]
