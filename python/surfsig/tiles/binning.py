@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -107,7 +107,8 @@ def _binned(
         owners = plan.owners(points)
         rows = layouts[layout].rows(cloud, np.arange(number, number + len(cloud), dtype=np.uint64), file)
         number += len(cloud)
-        order = np.argsort(owners, kind="stable")
+        # Whole numbers of 16 bits are sorted without comparing them.
+        order = np.argsort(owners.astype(np.uint16) if len(plan) <= 1 << 16 else owners, kind="stable")
         sizes = np.bincount(owners, minlength=len(plan))
         counts += sizes
         ends = np.cumsum(sizes)
@@ -161,32 +162,66 @@ def _sort(path: Path, layout: Layout, origins: NDArray[np.float64]) -> None:
         return
     dtype = layout.dtype
     rows = rows_from(path, dtype, 0, path.stat().st_size // dtype.itemsize)
-    points = coordinates(rows, origins)
+    columns = np.ascontiguousarray(coordinates(rows, origins).T)
     starts, lowest, highest = [0], [], []
     with path.open("r+b") as file:
-        for block in _blocks(points):
+        for block in _blocks(columns):
             file.write(rows[block].data)
             starts.append(starts[-1] + len(block))
-            lowest.append(np.fmin.reduce(points[block]))
-            highest.append(np.fmax.reduce(points[block]))
+            low, high = zip(*(_limits(column[block]) for column in columns), strict=True)
+            lowest.append(low)
+            highest.append(high)
     Blocks(np.array(starts), np.array(lowest), np.array(highest)).write(path)
 
 
-def _blocks(points: NDArray[np.float64]) -> list[NDArray[np.int64]]:
-    """Cut points in two along their longest side until few are left; numbers ascend in each block."""
-    blocks, left = [], [np.arange(len(points))]
-    while left:
-        numbers = left.pop()
-        values = points[numbers]
-        cut = len(numbers) > BLOCK_ROWS
-        if cut:
+def _limits(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Give the lowest and the highest number; of none, numbers that are none."""
+    low, high = values.min(), values.max()
+    if np.isnan(low):
+        low, high = np.fmin.reduce(values), np.fmax.reduce(values)
+    return float(low), float(high)
+
+
+def _blocks(columns: NDArray[np.float64]) -> Iterator[NDArray[np.int64]]:
+    """Cut points (3, n) into blocks of neighbours; numbers ascend in each.
+
+    First by a grid, whose cells are sorted without comparing points; cells with too many points are cut in
+    two along their longest side until few are left.
+    """
+    cells = _cells(columns)
+    order = np.argsort(cells, kind="stable")
+    ends = np.cumsum(np.bincount(cells))
+    for start, end in zip([0, *ends[:-1].tolist()], ends.tolist(), strict=True):
+        left = [order[start:end]] if start < end else []
+        while left:
+            numbers = left.pop()
+            below = _below(columns[:, numbers]) if len(numbers) > BLOCK_ROWS else None
+            if below is None:
+                yield numbers
+            else:
+                left += [numbers[~below], numbers[below]]
+
+
+def _cells(columns: NDArray[np.float64]) -> NDArray[np.uint16]:
+    """Number the cells of a grid along the two longest sides, each of half a block of points on average."""
+    limits = [_limits(column) for column in columns]
+    with np.errstate(invalid="ignore"):
+        lengths = np.nan_to_num([high - low for low, high in limits], nan=0.0, posinf=0.0)
+    side = int(np.clip(np.sqrt(2 * columns.shape[1] / BLOCK_ROWS), 1, 255))
+    cells = np.zeros(columns.shape[1], np.uint16)
+    for axis in np.argsort(lengths)[1:]:
+        cells *= np.uint16(side)
+        if lengths[axis] > 0:
             with np.errstate(invalid="ignore"):
-                lengths = np.fmax.reduce(values) - np.fmin.reduce(values)
-            along = values[:, int(np.argmax(np.nan_to_num(lengths, posinf=0)))]
-            below = along < np.partition(along, len(along) // 2)[len(along) // 2]
-            cut = bool(below.any())
-        if cut:
-            left += [numbers[~below], numbers[below]]
-        else:
-            blocks.append(numbers)
-    return blocks
+                place = (columns[axis] - limits[axis][0]) * (side / lengths[axis])
+                cells += np.clip(np.nan_to_num(place), 0, side - 1).astype(np.uint16)
+    return cells
+
+
+def _below(columns: NDArray[np.float64]) -> NDArray[np.bool_] | None:
+    """Cut points (3, n) in two along their longest side; None where all are in one place."""
+    with np.errstate(invalid="ignore"):
+        lengths = np.nan_to_num([high - low for low, high in map(_limits, columns)], nan=0.0, posinf=0.0)
+    along = columns[int(np.argmax(lengths))]
+    below: NDArray[np.bool_] = along < np.partition(along, len(along) // 2)[len(along) // 2]
+    return below if below.any() else None

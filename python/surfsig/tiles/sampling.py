@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from surfsig import _surfsig
 from surfsig.files.joined import joined
-from surfsig.point_cloud import PointCloud
+from surfsig.point_cloud import PointCloud, finite_rows
 from surfsig.tiles.survey import Survey
 
 
@@ -109,7 +109,7 @@ class Sampling:
         """
         start, stop = np.searchsorted(self._numbers, [first, first + len(cloud)])
         self._offsets[file].append(cloud.offsets[self._numbers[start:stop] - first])
-        finite = np.isfinite(points).all(axis=1)
+        finite = finite_rows(points)
         count = int(finite.sum())
         start, stop = np.searchsorted(self._sorted, [first_finite, first_finite + count])
         if start < stop:

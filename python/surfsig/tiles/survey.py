@@ -15,7 +15,7 @@ from surfsig.files.blocks import Finish, open_blocks, stacked
 from surfsig.files.joined import joined
 from surfsig.files.options import metres_per
 from surfsig.files.read_file import ReadOptions
-from surfsig.point_cloud import PointCloud
+from surfsig.point_cloud import PointCloud, finite_rows
 from surfsig.progress import ProgressCallback
 from surfsig.tiles.cell_counts import CellCounts
 from surfsig.tiles.rows import FileHead, Layout
@@ -144,11 +144,11 @@ class _Look:
         if sum(map(len, self._witnesses)) > _WITNESSES:
             self._witnesses = [self._finish.witnesses_of(stacked(self._witnesses))]
         points = np.asarray(cloud.points, np.float64)
-        finite = np.isfinite(points).all(axis=1)
+        finite = finite_rows(points)
         points = points if finite.all() else points[finite]
         if len(points):
             self._cells.add(points)
-            self._blocks.append((len(cloud), len(points), points.min(axis=0), points.max(axis=0)))
+            self._blocks.append((len(cloud), len(points), *_corners(points)))
         else:
             self._blocks.append((len(cloud), 0, np.full(3, np.inf), np.full(3, -np.inf)))
 
@@ -173,6 +173,12 @@ def _box_by_header(file: Path, options: ReadOptions) -> NDArray[np.float64] | No
 
     box = las_box(file)
     return box if box is None or options.unit is None else box * metres_per(options.unit)
+
+
+def _corners(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    # Column by column, as in `finite_rows`.
+    columns = points.T
+    return np.array([column.min() for column in columns]), np.array([column.max() for column in columns])
 
 
 def _after(progress: ProgressCallback | None, before: int, total: int) -> ProgressCallback | None:
