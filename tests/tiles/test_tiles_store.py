@@ -172,3 +172,18 @@ def test_box_and_unit_are_those_of_read(tmp_path: Path) -> None:
     whole = surfsig.read(paths, box=box, unit="ft")
     store = made(paths, tmp_path / "store", 3, box=box, unit="ft")
     check_same(store.read_box(np.array([[-np.inf] * 3, [np.inf] * 3])), whole)
+
+
+def test_a_first_look_that_misleads_is_made_again(tmp_path: Path) -> None:
+    # Sorted along x: the beginning of the only chunk says nothing of the rest.
+    cloud = town(60_000)
+    surfsig.write(tmp_path / "in.laz", cloud.at(np.argsort(cloud.offsets[:, 0])))
+    looks: list[int] = []
+    store = store_of(
+        Source.of(tmp_path / "in.laz"),
+        tmp_path / "store",
+        cut_into(8),
+        reading=lambda done, total: looks.append(done),
+    )
+    assert looks != sorted(looks)
+    assert max(store.counts) < 1.1 * 60_000 / 8

@@ -98,10 +98,29 @@ class Finish:
         return cloud.at(sorted(chosen))
 
 
+@dataclass(frozen=True)
+class OpenBlocks:
+    """A file that is read block by block.
+
+    Attributes
+    ----------
+    finish
+        What finishes the blocks.
+    clouds
+        The blocks: at least one, in the order of the file's points.
+    count
+        How many points the file has, where the blocks have only a share of them; else None.
+    """
+
+    finish: Finish
+    clouds: Iterator[PointCloud]
+    count: int | None = None
+
+
 @contextlib.contextmanager
 def open_blocks(
-    path: Path, options: ReadOptions, progress: ProgressCallback | None = None
-) -> Iterator[tuple[Finish, Iterator[PointCloud]]]:
+    path: Path, options: ReadOptions, progress: ProgressCallback | None = None, *, share: int = 1
+) -> Iterator[OpenBlocks]:
     """Open a file to be read block by block.
 
     Parameters
@@ -112,11 +131,12 @@ def open_blocks(
         What `surfsig.read` may be asked for; a box and a unit are applied to each block.
     progress
         Called with the bytes read so far and the size of the file.
+    share
+        Of LAZ files, one part in so many of each chunk's points is enough.
 
     Yields
     ------
-    Finish, iterator of PointCloud
-        What finishes the blocks, and the blocks: at least one, in the order of the file's points.
+    OpenBlocks
 
     Raises
     ------
@@ -127,17 +147,16 @@ def open_blocks(
         size = os.fstat(file.fileno()).st_size
         kind, _ = formats.of_content(path, file.read(formats.HEAD_BYTES), size)
         file.seek(0)
-        found = _opened(file, kind.name, str(path), options, Progress(progress, size))
+        found = _opened(file, kind.name, str(path), options, Progress(progress, size), share)
         if found is None:
-            yield Finish(), iter([read_file(path, options, progress)])
+            yield OpenBlocks(Finish(), iter([read_file(path, options, progress)]))
         else:
-            finish, clouds = found
-            yield finish, _with_options(clouds, options, str(path))
+            yield replace(found, clouds=_with_options(found.clouds, options, str(path)))
 
 
 def _opened(
-    file: BinaryIO, kind: str, source: str, options: ReadOptions, progress: Progress
-) -> tuple[Finish, Iterator[PointCloud]] | None:
+    file: BinaryIO, kind: str, source: str, options: ReadOptions, progress: Progress, share: int
+) -> OpenBlocks | None:
     """Open a file whose format comes in blocks; None for any other, and where an option speaks against it."""
     asked = options.of_formats()
     if kind in _OF_LAS and not asked:
@@ -145,12 +164,15 @@ def _opened(
 
         box = None if options.box is None else box_array(options.box)
         las = OpenLas(file, source, progress, box)
-        return Finish(colours=True, bytes_in_16_bits=True, usual=las.usual), las.clouds(BLOCK_POINTS)
+        finish = Finish(colours=True, bytes_in_16_bits=True, usual=las.usual)
+        # In a box nobody knows how many points there are before all are looked at.
+        is_shared = share > 1 and box is None and las.only_beginnings(share)
+        return OpenBlocks(finish, las.clouds(BLOCK_POINTS), las.header.point_count if is_shared else None)
     if kind == "PLY" and not asked:
         from surfsig.files.ply import clouds
 
         found = clouds(file, source, progress)
-        return None if found is None else (Finish(colours=True), found)
+        return None if found is None else OpenBlocks(Finish(colours=True), found)
     if kind == "text" and asked.keys() <= {"columns"}:
         from surfsig.files import text
 
@@ -159,7 +181,7 @@ def _opened(
             return None
         layout, blocks = opened
         decimals = None if layout.decimals is None else tuple(sorted(layout.decimals))
-        return Finish(colours=True, decimals=decimals), blocks
+        return OpenBlocks(Finish(colours=True, decimals=decimals), blocks)
     return None
 
 

@@ -140,6 +140,11 @@ class OpenLas:
         """Give no points but those of some chunks from now on."""
         self._chunks = chunks
 
+    def only_beginnings(self, share: int) -> bool:
+        """Give of each chunk no more than one part in `share` from now on; tell whether there are chunks."""
+        self.only([Chunk(place, size, -(-points // share)) for place, size, points in self._chunks])
+        return bool(self._chunks)
+
     def cloud(self, columns: dict[str, NDArray[Any]]) -> PointCloud:
         """Make a cloud of columns, with all dimensions, and colours as they are stored."""
         fields = dict(columns)

@@ -25,10 +25,24 @@ from surfsig.tiles.store import (
     rows_from,
     rows_path,
 )
-from surfsig.tiles.survey import Survey, blocks_again, surveyed
+from surfsig.tiles.survey import (
+    FIRST_SHARE,
+    LostFileError,
+    SecondLook,
+    Survey,
+    Unreadable,
+    blocks_again,
+    surveyed,
+    unreadable_file,
+    warn_of_differences,
+)
 
 BLOCK_ROWS = 1 << 15
 """Rows of a block that is read as one: some 2 MB, and a halo reads little that it does not need."""
+
+MOST_EXCESS = 1.15
+"""Points of the largest tile over those that the first look expected, from which on all points are looked at
+first: memory is reckoned by them."""
 
 BUFFER_BYTES = 256 << 20
 """Rows that wait in memory for their tiles' files; with fewer tiles, each gets larger pieces at a time."""
@@ -79,13 +93,38 @@ def store_of(
             return store
     folder.mkdir(parents=True, exist_ok=True)
     with locked(folder):
-        removed(folder)
-        survey = surveyed(source, reading)
-        store = _binned(survey, source, folder, cut(survey), binning)
+        store = _made(source, folder, cut, reading, binning)
         if source.fingerprint() != fingerprint:
             raise FileFormatError(f"{folder}: the input files changed while they were read")
         store.write_index(fingerprint)
     return store
+
+
+def _made(
+    source: Source,
+    folder: Path,
+    cut: Cut,
+    reading: ProgressCallback | None,
+    binning: ProgressCallback | None,
+) -> Store:
+    unreadable: list[Unreadable] = []
+    share = FIRST_SHARE
+    while True:
+        removed(folder)
+        survey = surveyed(source, reading, unreadable, share)
+        plan = cut(survey)
+        try:
+            store = _binned(survey, source, folder, plan, binning)
+        except LostFileError as lost:
+            # Its points that were binned must not stay: all is begun anew without it.
+            file, error = lost.args
+            unreadable.append(unreadable_file(file, source, error))
+            continue
+        expected = np.bincount(plan.owners(survey.cells.places()), survey.cells.counts, len(plan))
+        if share == 1 or max(store.counts) <= MOST_EXCESS * max(expected.max(), BLOCK_ROWS):
+            return store
+        # What the first look saw was not like the rest.
+        share = 1
 
 
 def _binned(
@@ -98,11 +137,15 @@ def _binned(
     finite = 0
     counts = np.zeros(len(plan), np.int64)
     number = 0
-    for file, cloud in blocks_again(survey, source.options, progress):
+    looks: list[SecondLook] = []
+    for file, finish, cloud in blocks_again(survey, source.options, progress):
+        if file == len(looks):
+            looks.append(SecondLook(finish))
         layout = layout_of_file[file]
         if Layout.of(cloud) != layouts[layout]:
             raise FileFormatError(f"{survey.files[file]}: changed while it was read")
         points = np.asarray(cloud.points, np.float64)
+        looks[file].add(cloud, points)
         finite += sampling.take(file, cloud, points, number, finite)
         owners = plan.owners(points)
         rows = layouts[layout].rows(cloud, np.arange(number, number + len(cloud), dtype=np.uint64), file)
@@ -117,6 +160,9 @@ def _binned(
     if number != survey.count:
         raise FileFormatError(f"{survey.files[0].parent}: the input files changed while they were read")
     bins.flush()
+    for look in looks:
+        look.take_over(survey)
+    warn_of_differences(survey)
     origins = np.array([head.witnesses.origin for head in survey.heads])
     for bin_number in range(len(plan)):
         for layout, kind in enumerate(layouts):
@@ -203,7 +249,7 @@ def _blocks(columns: NDArray[np.float64]) -> Iterator[NDArray[np.int64]]:
 
 
 def _cells(columns: NDArray[np.float64]) -> NDArray[np.uint16]:
-    """Number the cells of a grid along the two longest sides, each of half a block of points on average."""
+    """Give each point its cell of a grid along the two longest sides, of half a block of points each."""
     limits = [_limits(column) for column in columns]
     with np.errstate(invalid="ignore"):
         lengths = np.nan_to_num([high - low for low, high in limits], nan=0.0, posinf=0.0)

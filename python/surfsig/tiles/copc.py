@@ -61,9 +61,9 @@ class CopcSource:
             # They were given when the files were looked at first.
             warnings.simplefilter("ignore")
             for file, head in zip(self.files, self.heads, strict=True):
-                with open_blocks(file, ReadOptions(box=box)) as (finish, blocks):
-                    cloud = stacked(list(blocks))
-                clouds.append(finish.cloud(cloud, head.witnesses))
+                with open_blocks(file, ReadOptions(box=box)) as opened:
+                    cloud = stacked(list(opened.clouds))
+                clouds.append(opened.finish.cloud(cloud, head.witnesses))
                 kept.append(np.arange(len(clouds[-1])) < len(cloud))
             return joined(clouds, str(self.files[0])).at(np.concatenate(kept))
 

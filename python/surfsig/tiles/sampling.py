@@ -118,7 +118,7 @@ class Sampling:
         return count
 
     def facts(self, survey: Survey) -> WholeFacts:
-        """Give what follows from all blocks."""
+        """Give what follows from all blocks, once `survey` has the heads of all files."""
         clouds = [
             PointCloud(
                 np.concatenate([head.witnesses.offsets[:0], *self._offsets[file]]), head.witnesses.origin
