@@ -21,8 +21,7 @@ def counted(points: np.ndarray, blocks: int = 1) -> CellCounts:
 def in_half_open_boxes(plan: Plan, points: np.ndarray) -> np.ndarray:
     """The slow reference: which boxes hold each point, (n, t)."""
     low, high = plan.boxes[:, 0], plan.boxes[:, 1]
-    inside: np.ndarray = ((points[:, None] >= low) & (points[:, None] < high)).all(axis=2)
-    return inside
+    return np.asarray(((points[:, None] >= low) & (points[:, None] < high)).all(axis=2))
 
 
 @settings(derandomize=True, max_examples=25, deadline=None)

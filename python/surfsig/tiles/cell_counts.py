@@ -9,8 +9,8 @@ MOST_CELLS = 1 << 18
 """Occupied cells beyond which they double: tiles are then cut to a part in a thousand, in some 10 MB."""
 
 SAMPLED = 1 << 16
-"""Points of a block that are looked at, at least, where it has as many: the others are taken to be where these
-are, which moves a cut by less than a hundredth of a tile."""
+"""Points of a block that are looked at, at least, where it has as many: the others are taken to be where
+these are, which moves a cut by less than a hundredth of a tile."""
 
 _CELLS_OF_FIRST = 1024
 """Cells along the longest side of the first points: cells only become larger."""
@@ -105,7 +105,8 @@ class CellCounts:
 
     def places(self) -> NDArray[np.float64]:
         """Give the middle of each cell, (m, 3)."""
-        return np.ldexp(self.keys + 0.5, self.exponent or 0)
+        middles: NDArray[np.float64] = np.ldexp(self.keys + 0.5, self.exponent or 0)
+        return middles
 
     @property
     def total(self) -> int:
