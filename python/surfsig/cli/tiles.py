@@ -77,7 +77,9 @@ def is_tiled(output: Path, tiling: Mapping[str, Any]) -> bool:
     from surfsig.files import formats
 
     known = {extension for kind in formats.FORMATS if kind.write is not None for extension in kind.extensions}
-    if output.is_dir() or not output.suffix or (output / "manifest.json").exists():
+    if not output.suffix or (output / "manifest.json").exists():
+        return True
+    if output.is_dir() and output.suffix.lower() not in known:
         return True
     asked = next((name for name in _OPTIONS if tiling[name]), None)
     if asked is not None:

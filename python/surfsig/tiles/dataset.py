@@ -54,6 +54,10 @@ class TilePart:
     def read(self) -> PointCloud:
         """Read its points with all columns.
 
+        Returns
+        -------
+        PointCloud
+
         Raises
         ------
         OSError, FileFormatError
@@ -129,7 +133,13 @@ class TileDataset:
         return [part.path for part in self.tiles if part.path is not None]
 
     def clouds(self) -> Iterator[PointCloud]:
-        """Give the points of one part after the other."""
+        """Give the points of one part after the other.
+
+        Returns
+        -------
+        iterator of PointCloud
+            Each part is read when it is asked for.
+        """
         return (part.read() for part in self.tiles if part.path is not None)
 
     def read(self, box: ArrayLike | None = None) -> PointCloud:
@@ -262,6 +272,10 @@ class FileDataset:
         ----------
         box
             (2, 3), its lowest and its highest corner, both of which belong to it; all points by default.
+
+        Returns
+        -------
+        PointCloud
 
         Raises
         ------
