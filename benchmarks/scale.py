@@ -33,7 +33,6 @@ RADIUS = 0.5
 DENSITY = 127.0
 """Points per square metre: some 100 in a ball."""
 FILES = 64
-SAME_BITS_POINTS = 2_000_000
 MOST_PROCESSOR_TIME, MOST_SPREAD = 1.25, 0.20
 """What is to be reached: processor time over that of the whole cloud, and by how much memory may differ."""
 _SAMPLES_PER_SECOND = 20
@@ -234,6 +233,7 @@ def main() -> None:
     parser.add_argument("--points", type=float, nargs="+", default=[20, 60], help="millions")
     parser.add_argument("--memory", default="2GB")
     parser.add_argument("--most-whole", type=float, default=30, help="millions that fit into memory at once")
+    parser.add_argument("--same-bits", type=float, default=2, help="millions of points that are hashed")
     parser.add_argument("--folder", type=Path, help="for input and output; by default a temporary one")
     parser.add_argument("--write", action="store_true", help="update BENCHMARKS.md")
     parser.add_argument("--job", help=argparse.SUPPRESS)
@@ -261,7 +261,7 @@ def main() -> None:
             peaks.append(tiles["peak_bytes"])
             ratios.append(float(row[5]))
             print(" | ".join(row), file=sys.stderr)
-        bits = same_bits(folder / "bits", SAME_BITS_POINTS)
+        bits = same_bits(folder / "bits", int(1e6 * arguments.same_bits))
     limit = memory_bytes(arguments.memory)
     spread = max(peaks) / min(peaks) - 1
     equal = len({value for _, value in bits if not value.startswith("not")}) == 1
@@ -288,12 +288,13 @@ def main() -> None:
     ]
     notes = [
         *measured_on(results),
-        f"Input: {FILES} LAZ files, side by side, {DENSITY:g} points per square metre in steps of a millimetre, "
-        f"balls of {RADIUS} m with {(whole or {}).get('neighbours', 0):.0f} points; the output has all columns.",
+        f"Input: {FILES} LAZ files, side by side, {DENSITY:g} points per square metre in steps of a "
+        f"millimetre; balls of {RADIUS} m with {(whole or {}).get('neighbours', 0):.0f} points; all columns "
+        "are written.",
         f"Peak memory: the resident memory of all processes together, {_SAMPLES_PER_SECOND} times a second.",
-        "Processor time: of all threads and processes, reading and writing LAZ included; the whole cloud is read, "
-        "extracted and written as one.",
-        f"Same bits: SHA-256 of all columns of {SAME_BITS_POINTS:,} points, in the order of the input.",
+        "Processor time: of all threads and processes, reading and writing LAZ included; the whole cloud is "
+        "read, extracted and written as one.",
+        f"Same bits: SHA-256 of all columns of {1e6 * arguments.same_bits:,.0f} points, in the order of the input.",
         f"Cores: {os.cpu_count()}.",
     ]
     text = "\n\n".join(

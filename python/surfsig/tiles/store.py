@@ -8,7 +8,6 @@ the rest of its neighbours.
 from __future__ import annotations
 
 import json
-import warnings
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,8 +19,8 @@ from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
 from surfsig.files.atomic import replacing
-from surfsig.files.joined import joined
 from surfsig.point_cloud import PointCloud
+from surfsig.tiles.frame import Frame
 from surfsig.tiles.plan import Plan
 from surfsig.tiles.rows import FileHead, Layout
 from surfsig.tiles.sampling import WholeFacts
@@ -82,6 +81,7 @@ class Store:
     unreadable: tuple[Unreadable, ...]
     facts: WholeFacts
     _blocks: dict[tuple[int, int], Blocks] = field(default_factory=dict, repr=False, compare=False)
+    _frames: list[Frame] = field(default_factory=list, repr=False, compare=False)
 
     def read(self, tile: int, halo: float) -> TileCloud:
         """Read a tile, and all points within a distance of it.
@@ -149,33 +149,35 @@ class Store:
     ) -> tuple[PointCloud, NDArray[np.uint64], NDArray[np.bool_]]:
         """Make one cloud of rows of all layouts, in the order of their numbers; say which are a tile's own.
 
-        Each file's rows are finished and joined with its witnesses behind them, as `surfsig.read` finishes
-        and joins whole files; then the witnesses leave.
+        Fields, types and frame are those that `surfsig.read` gives of all files.
         """
         stacks, numbers = [], []
-        for layout, found in zip(self.layouts, parts, strict=True):
-            rows = np.concatenate([np.empty(0, layout.dtype), *found]) if len(found) != 1 else found[0]
+        for kind, found in zip(self.layouts, parts, strict=True):
+            rows = np.concatenate([np.empty(0, kind.dtype), *found]) if len(found) != 1 else found[0]
             own = np.zeros(len(rows), np.bool_)
             if tile is not None and found:
                 own[: len(found[0])] = True
             order = np.argsort(rows["number"], kind="stable")
             stacks.append((rows[order], own[order]))
-        clouds, kept, owned = [], [], []
-        for file, head in enumerate(self.heads):
-            rows, own = stacks[self.layout_of_file[file]]
-            first, last = np.searchsorted(rows["file"], [file, file + 1])
-            part = rows[first:last]
-            numbers.append(part["number"].astype(np.uint64))
-            owned.append(own[first:last])
-            clouds.append(head.cloud(self.layouts[self.layout_of_file[file]], part))
-            kept.append(np.arange(len(clouds[-1])) < len(part))
-        del stacks
-        with warnings.catch_warnings():
-            # They were given when the store was made.
-            warnings.simplefilter("ignore")
-            cloud = joined(clouds, str(self.folder))
-        chosen = np.concatenate(kept)
-        return cloud.at(chosen), np.concatenate(numbers), np.concatenate(owned)
+        ends = [
+            np.searchsorted(np.ascontiguousarray(rows["file"]), np.arange(len(self.heads) + 1)).tolist()
+            for rows, _ in stacks
+        ]
+        files, owned = [], []
+        for file, layout in enumerate(self.layout_of_file):
+            rows, own = stacks[layout]
+            part = slice(ends[layout][file], ends[layout][file + 1])
+            files.append(rows[part])
+            numbers.append(rows["number"][part])
+            owned.append(own[part])
+        return self._frame.cloud(files), np.concatenate(numbers), np.concatenate(owned)
+
+    @property
+    def _frame(self) -> Frame:
+        """The frame of all files, made when it is first needed."""
+        if not self._frames:
+            self._frames.append(Frame(self.heads, [self.layouts[layout] for layout in self.layout_of_file]))
+        return self._frames[0]
 
     def _path(self, tile: int, layout: int) -> Path:
         return rows_path(self.folder, tile, layout)
