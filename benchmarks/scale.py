@@ -220,8 +220,10 @@ def same_bits(folder: Path, points: int) -> list[Row]:
         rows.append(("two workers of a Dask cluster", "not measured: Dask is not installed"))
     else:
         with (
-            distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster,
-            distributed.Client(cluster) as client,
+            distributed.LocalCluster(  # type: ignore[no-untyped-call]
+                2, threads_per_worker=1, dashboard_address=None
+            ) as cluster,
+            distributed.Client(cluster) as client,  # type: ignore[no-untyped-call]
         ):
             add("16 tiles, two workers of a Dask cluster", folder / "dask", tiles=16, client=client)
     return rows
@@ -294,7 +296,7 @@ def main() -> None:
         f"Peak memory: the resident memory of all processes together, {_SAMPLES_PER_SECOND} times a second.",
         "Processor time: of all threads and processes, reading and writing LAZ included; the whole cloud is "
         "read, extracted and written as one.",
-        f"Same bits: SHA-256 of all columns of {1e6 * arguments.same_bits:,.0f} points, in the order of the input.",
+        f"Same bits: SHA-256 of all columns of {1e6 * arguments.same_bits:,.0f} points, in their order.",
         f"Cores: {os.cpu_count()}.",
     ]
     text = "\n\n".join(

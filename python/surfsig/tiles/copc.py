@@ -73,7 +73,7 @@ class _Indexed(NamedTuple):
 
     path: Path
     nodes: list[CopcNode]
-    count: int
+    points: int
 
 
 def copc_of(source: Source, cut: Cut, progress: ProgressCallback | None = None) -> CopcSource | None:
@@ -100,12 +100,12 @@ def copc_of(source: Source, cut: Cut, progress: ProgressCallback | None = None) 
         return None
     found = [one for one in indexed if one is not None]
     survey = Survey()
-    survey.count = survey.finite = sum(one.count for one in found)
+    survey.count = survey.finite = sum(one.points for one in found)
     sampling = Sampling(survey.count, survey.finite)
     first = 0
     for number, one in enumerate(found):
         _look(one, number, first, sampling, survey)
-        first += one.count
+        first += one.points
         if progress is not None:
             progress(number + 1, len(found))
     plan = cut(survey)
@@ -137,7 +137,7 @@ def _look(one: _Indexed, number: int, first: int, sampling: Sampling, survey: Su
                 witnesses = finish.witnesses_of(stacked([witnesses, finish.witnesses_of(cloud)]))
             first += points
     survey.files.append(one.path)
-    survey.heads.append(FileHead(finish, witnesses, one.count))
+    survey.heads.append(FileHead(finish, witnesses, one.points))
     survey.layouts.append(Layout.of(witnesses))
     survey.cells.add_cells(
         np.array([node.middle for node in one.nodes]).reshape(-1, 3),

@@ -1,7 +1,8 @@
 """Clouds of rows of several files, with the fields, types and origin that `surfsig.read` gives of all files.
 
-What the fields of each file become is seen at its witnesses, which are finished and joined as whole files are.
-Where that is no more than another type, rows are put into their places at once; else they are finished, too.
+What the fields of each file become is seen at its witnesses, which are finished and joined as whole files
+are. Where that is no more than another type, rows are put into their places at once; else they are
+finished, too.
 """
 
 from __future__ import annotations
