@@ -44,7 +44,7 @@ MOST_EXCESS = 1.15
 """Points of the largest tile over those that the first look expected, from which on all points are looked at
 first: memory is reckoned by them."""
 
-BUFFER_BYTES = 256 << 20
+BUFFER_BYTES = 128 << 20
 """Rows that wait in memory for their tiles' files; with fewer tiles, each gets larger pieces at a time."""
 
 Cut = Callable[[Survey], Plan]
