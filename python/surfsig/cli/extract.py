@@ -145,7 +145,13 @@ def extract_command(
         refuse_in_tiles(signatures=signatures, like=like, at=at, voxel=voxel, **reading)
         asked = {"radius": radius, "neighbors": neighbors, "axes": axes, "fit": fit, "viewpoint": viewpoint}
         extract_in_tiles(
-            files, output, {**asked, "robust": robust, "threads": threads}, tiling, reading, shown, as_json
+            files,
+            output,
+            {**how_in_tiles, "robust": robust, "threads": threads},
+            tiling,
+            reading,
+            shown,
+            as_json,
         )
         return
     file = files[0] if len(files) == 1 else files
