@@ -143,7 +143,13 @@ def extract_command(
     tiling, reading = split_options(more)
     if is_tiled(output, tiling):
         refuse_in_tiles(signatures=signatures, like=like, at=at, voxel=voxel, **reading)
-        asked = {"radius": radius, "neighbors": neighbors, "axes": axes, "fit": fit, "viewpoint": viewpoint}
+        how_in_tiles = {
+            "radius": radius,
+            "neighbors": neighbors,
+            "axes": axes,
+            "fit": fit,
+            "viewpoint": viewpoint,
+        }
         extract_in_tiles(
             files,
             output,
