@@ -5,12 +5,13 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 OUT    ?= demo
 COUNT  ?= 100000
+POINTS ?= 20 60 200
 PREFIX ?= /usr/local
 
 # What the compiled module is made from; a change of any rebuilds it.
 SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -name '*.bin' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help demo test test-all lint format bench bench-reading bench-error bench-segmentation bench-intervals bench-registration bench-finding bench-odometry fuzz docs tour wheel check-wheel header install-c clean build
+.PHONY: help demo test test-all lint format bench bench-reading bench-error bench-segmentation bench-intervals bench-registration bench-finding bench-odometry fuzz docs tour wheel check-wheel header install-c clean build bench-scale
 .DEFAULT_GOAL := help
 
 help: ## Say what there is to make
@@ -65,6 +66,9 @@ bench-finding: build ## Look for objects in simulated and real scenes, and write
 
 bench-odometry: build ## Follow sensors through a simulated building, and write that part of BENCHMARKS.md
 	$(BIN)/python benchmarks/odometry.py --write
+
+bench-scale: build ## Work on millions of points in tiles, and write that part of BENCHMARKS.md: make bench-scale POINTS="20 60 200"
+	$(BIN)/python benchmarks/scale.py --points $(POINTS) --write
 
 fuzz: build ## Read damaged files of all formats: make fuzz COUNT=100000
 	$(BIN)/python fuzz/mutate.py --count $(COUNT)

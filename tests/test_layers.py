@@ -29,7 +29,7 @@ PYTHON_FLOORS = (
     ("one_sided_normals", "alignment"),
     ("shapes",),
     ("surfaces",),
-    ("registration", "odometry", "finding", "recurrences"),
+    ("registration", "odometry", "finding", "recurrences", "tiles"),
     ("paper",),
     ("surfsig",),
     ("cli",),

@@ -55,6 +55,7 @@ CALLS: dict[str, Callable[..., Any]] = {
 }
 OTHERS = {
     "estimate_odometry": "it tells nothing yet",
+    "extract_tiles": "it tells what it does, too",
     "read": "one thread reads",
     "write": "one thread writes",
 }

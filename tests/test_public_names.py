@@ -21,6 +21,7 @@ IMPORTED_FOR_CHECKERS = {
     "pd": SimpleNamespace(DataFrame=object),
     "pa": SimpleNamespace(Table=object),
     "Axes": object,
+    "Client": object,
     "ScalarMappable": object,
     "Extraction": surfsig.Extraction,
 }

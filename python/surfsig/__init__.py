@@ -76,6 +76,15 @@ from surfsig.surfaces import (
     Surfaces,
     find_surfaces,
 )
+from surfsig.tiles import (
+    FileDataset,
+    TileDataset,
+    TilePart,
+    TilesFailedError,
+    extract_tiles,
+    map_tiles,
+    open,
+)
 from surfsig.units import unit_mismatch
 
 __all__ = [
@@ -86,6 +95,7 @@ __all__ = [
     "Extraction",
     "FieldMatches",
     "FieldSignatures",
+    "FileDataset",
     "FileFormatError",
     "FindSettings",
     "FitUsed",
@@ -119,6 +129,9 @@ __all__ = [
     "SurfacePatch",
     "Surfaces",
     "SurfsigError",
+    "TileDataset",
+    "TilePart",
+    "TilesFailedError",
     "TimedScan",
     "Trajectory",
     "__version__",
@@ -128,6 +141,7 @@ __all__ = [
     "extract",
     "extract_field_signatures",
     "extract_radii",
+    "extract_tiles",
     "find_instances",
     "find_keypoints",
     "find_recurrences",
@@ -141,7 +155,9 @@ __all__ = [
     "fit_torus",
     "flat_atom_length",
     "flip_signatures",
+    "map_tiles",
     "match_fields",
+    "open",
     "open_scan_sequence",
     "read",
     "read_trajectory",

@@ -8,11 +8,13 @@ from numpy.typing import NDArray
 
 __all__ = [
     "COARSEST_STEP",
+    "FEWEST_AUTO_POINTS",
     "FEWEST_SURFACE_POINTS",
     "GOOD",
     "INSTRUCTION_SET",
     "KIND_PARAMETERS",
     "OPTIMAL",
+    "RESOLUTION_SAMPLES",
     "SCAN_STATUS_NAMES",
     "STATUS_NAMES",
     "E57Reader",
@@ -27,7 +29,10 @@ __all__ = [
     "__version__",
     "align_pieces",
     "consistent_directions",
+    "coordinate_resolution",
     "coordinate_steps",
+    "different_places",
+    "distance_to_nearest",
     "extract",
     "field_keypoints",
     "field_signatures",
@@ -44,6 +49,7 @@ __all__ = [
     "prepare_model",
     "refine_poses",
     "register",
+    "sampled_numbers",
     "voxel_representatives",
     "write_e57",
 ]
@@ -57,12 +63,17 @@ __version__: str
 SCAN_STATUS_NAMES: list[str]
 STATUS_NAMES: list[str]
 KIND_PARAMETERS: dict[str, int]
+FEWEST_AUTO_POINTS: int
 FEWEST_SURFACE_POINTS: int
 INSTRUCTION_SET: str
 COARSEST_STEP: float
+RESOLUTION_SAMPLES: int
 OPTIMAL: float
 GOOD: float
 
+def coordinate_resolution(
+    points: NDArray[np.floating], *, origin: Sequence[float]
+) -> tuple[bool, list[float]]: ...
 def coordinate_steps(points: NDArray[np.floating], *, origin: Sequence[float]) -> tuple[float, float]: ...
 def extract(
     points: NDArray[np.floating],
@@ -78,7 +89,11 @@ def extract(
     robust: bool = False,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
+    whole: tuple[bool, Sequence[float], Sequence[float], float, Sequence[Sequence[float]]] | None = None,
 ) -> list[dict[str, NDArray[Any]]]: ...
+def different_places(candidates: NDArray[np.float64]) -> list[list[float]]: ...
+def distance_to_nearest(points: NDArray[np.float64], place: Sequence[float], k: int) -> float: ...
+def sampled_numbers(count: int) -> list[int]: ...
 def field_signatures(
     points: NDArray[np.floating],
     *,

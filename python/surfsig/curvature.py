@@ -106,6 +106,21 @@ def extract(
         If coordinates come in steps that are too large for the radius; the places that suffer have the status
         ``TOO_COARSE``, and no curvature.
     """
+    size, most = neighborhood(radius, neighbors, axes)
+    job = _Job(axes, fit, at, voxel, viewpoint, normals, robust, threads, progress)
+    return job.run(PointCloud.of(cloud), size, most)[0]
+
+
+def neighborhood(
+    radius: float | Literal["auto"] | None, neighbors: int | None, axes: Axes
+) -> tuple[float | Literal["auto"] | None, int | None]:
+    """Check what `extract` takes as the size of its neighbourhoods, and return radius and number.
+
+    Raises
+    ------
+    InvalidInputError
+        If they have no meaning, or none together.
+    """
     if radius is None and neighbors is None:
         raise InvalidInputError("give a radius, or neighbors, or both")
     if isinstance(radius, str):
@@ -115,10 +130,82 @@ def extract(
             raise InvalidInputError("radius='auto' and neighbors exclude each other")
         if axes == "sensor":
             raise InvalidInputError("radius='auto' chooses by standard errors, which axes='sensor' has not")
-    job = _Job(axes, fit, at, voxel, viewpoint, normals, robust, threads, progress)
     size = radius if radius is None or isinstance(radius, str) else positive_length(radius, "radius")
-    most = None if neighbors is None else whole_number(neighbors, "neighbors", MOST_NEIGHBORS)
-    return job.run(PointCloud.of(cloud), size, most)[0]
+    return size, None if neighbors is None else whole_number(neighbors, "neighbors", MOST_NEIGHBORS)
+
+
+@dataclass(frozen=True)
+class WholeCloud:
+    """What an extraction of a part of a cloud takes from the whole, so that both give the same bits.
+
+    Attributes
+    ----------
+    single_precision, lattice
+        Of the whole cloud's coordinates, as ``_surfsig.coordinate_resolution`` finds them.
+    distances
+        From a few places of the whole cloud to their nearest points, ascending; empty where the
+        neighbourhoods are balls of one radius.
+    largest
+        The largest of the whole cloud's coordinates, without its sign.
+    complete
+        (2, 3), the lowest and the highest corner of the box in which the part has all of its points.
+    """
+
+    single_precision: bool
+    lattice: Sequence[float]
+    distances: Sequence[float]
+    largest: float
+    complete: NDArray[np.float64]
+
+    def arguments(self) -> tuple[bool, list[float], list[float], float, list[list[float]]]:
+        """Give what the core takes."""
+        box: list[list[float]] = self.complete.tolist()
+        return self.single_precision, list(self.lattice), list(self.distances), self.largest, box
+
+
+def extract_part(
+    cloud: PointCloud,
+    whole: WholeCloud,
+    radius: float | Literal["auto"] | None = None,
+    *,
+    neighbors: int | None = None,
+    axes: Axes = AXES,
+    fit: Fit = FIT,
+    at: ArrayLike | None = None,
+    viewpoint: ArrayLike | None = None,
+    robust: bool = False,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> tuple[Extraction, NDArray[np.uint32]]:
+    """Extract curvature at places of a part of a cloud, as `extract` does at those of the whole.
+
+    Parameters
+    ----------
+    cloud
+        The part: points of the whole cloud in the whole cloud's order.
+    whole
+        What it takes from the whole.
+    radius, neighbors, axes, fit, at, viewpoint, robust, threads, progress
+        As in `extract`.
+
+    Returns
+    -------
+    Extraction
+        With the whole cloud's bits, but at those places:
+    numpy.ndarray
+        (k,) uint32, the numbers of the places whose neighbourhoods reach beyond what the part has of the
+        whole.
+
+    Raises
+    ------
+    InvalidInputError
+        If an argument has no meaning; its text says which.
+    """
+    size, most = neighborhood(radius, neighbors, axes)
+    job = _Job(axes, fit, at, None, viewpoint, None, robust, threads, progress)
+    (found,), beyond = job.results(cloud, size, most, whole)
+    assert beyond is not None
+    return found, beyond
 
 
 def extract_radii(
@@ -171,7 +258,7 @@ def _each_its_own(radius: float | str | None, count: int) -> float | NDArray[np.
     return radius if isinstance(radius, float) else np.full(count, np.nan, np.float32)
 
 
-_FEW_TOO_COARSE = 0.01
+FEW_TOO_COARSE = 0.01
 """Share of places up to which nothing is said of coarse coordinates beside their status: lines of a scanner,
 as far apart as a fifth of the radius, are steps of those few faces that they run along."""
 
@@ -193,7 +280,26 @@ class _Job:
     def run(
         self, cloud: PointCloud, radius: float | Sequence[float] | str | None, neighbors: int | None
     ) -> list[Extraction]:
-        """Extract, once for each radius."""
+        """Extract, once for each radius; warn where coordinates are too coarse for it."""
+        extractions, _ = self.results(cloud, radius, neighbors)
+        counts = [int((found.status == Status.TOO_COARSE).sum()) for found in extractions]
+        too_coarse, places = max(counts, default=0), len(extractions[0]) if extractions else 0
+        if too_coarse > FEW_TOO_COARSE * places:
+            warnings.warn(
+                f"{step_text(cloud)}, too coarse for the radius: {too_coarse} of "
+                f"{places} places have no curvature (status too_coarse)",
+                stacklevel=3,
+            )
+        return extractions
+
+    def results(
+        self,
+        cloud: PointCloud,
+        radius: float | Sequence[float] | str | None,
+        neighbors: int | None,
+        whole: WholeCloud | None = None,
+    ) -> tuple[list[Extraction], NDArray[np.uint32] | None]:
+        """Extract, once for each radius; of a part of a cloud, tell which places looked beyond it."""
         self._check()
         origin: Sequence[float] = cloud.origin.tolist()
         query, indices, points = places(cloud, self.at, self.voxel)
@@ -211,17 +317,11 @@ class _Job:
             robust=self.robust,
             threads=thread_count(self.threads),
             progress=progress_callback(self.progress),
+            whole=None if whole is None else whole.arguments(),
         )
         sizes = radius if isinstance(radius, Sequence) and not isinstance(radius, str) else [radius]
-        counts = [int((arrays["status"] == Status.TOO_COARSE).sum()) for arrays in found]
-        too_coarse = max(counts, default=0)
-        if too_coarse > _FEW_TOO_COARSE * len(points):
-            warnings.warn(
-                f"{step_text(cloud)}, too coarse for the radius: {too_coarse} of "
-                f"{len(points)} places have no curvature (status too_coarse)",
-                stacklevel=3,
-            )
-        return [
+        beyond = found[0].pop("beyond") if whole is not None else None
+        extractions = [
             Extraction(
                 radius=arrays.pop("radius", _each_its_own(size, len(points))),
                 **arrays,
@@ -232,6 +332,7 @@ class _Job:
             )
             for size, arrays in zip(sizes, found, strict=True)
         ]
+        return extractions, beyond
 
     def _check(self) -> None:
         if self.axes not in ("surface", "sensor"):

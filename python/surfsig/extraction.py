@@ -50,6 +50,12 @@ class Status(enum.IntEnum):
     normal of the points as they are."""
 
 
+def count_statuses(statuses: NDArray[np.uint8]) -> dict[str, int]:
+    """Count the places of each status, by its name in lower case; none that has no place."""
+    counts = np.bincount(statuses, minlength=len(Status))
+    return {status.name.lower(): int(counts[status]) for status in Status if counts[status]}
+
+
 class FitUsed(enum.IntEnum):
     """Whose curvature a place has."""
 
@@ -224,8 +230,7 @@ class Extraction:
         -------
         The counts, by the status's name in lower case; none that has no place.
         """
-        counts = np.bincount(self.status, minlength=len(Status))
-        return {status.name.lower(): int(counts[status]) for status in Status if counts[status]}
+        return count_statuses(self.status)
 
     @overload
     def signatures(

@@ -7,8 +7,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use surfsig::{
-    Column, ExtractOptions, Extraction, FitAxes, FitKind, Monitor, Neighborhood, Offsets, PointCloud,
-    Queries, Radius, Resolution,
+    Column, ExtractOptions, Extraction, FitAxes, FitKind, Monitor, NearestDistances, Neighborhood, Offsets,
+    PartSize, PointCloud, Queries, Radius, Resolution, WholeCloud,
 };
 
 /// An (n, 3) array of either precision, contiguous.
@@ -44,6 +44,20 @@ pub enum Size {
     Word(String),
 }
 
+/// What a part takes from the whole cloud: whether all its coordinates are float32 and the steps of its lattice; the
+/// distances to the nearest points at a few places and the largest coordinate; and the box in which the part is
+/// complete.
+#[derive(FromPyObject)]
+pub struct Whole(bool, [f64; 3], Vec<f64>, f64, [[f64; 3]; 2]);
+
+impl Whole {
+    fn cloud(self, origin: [f64; 3]) -> WholeCloud {
+        let Self(single_precision, lattice, distances, largest, complete) = self;
+        let resolution = Resolution::known(single_precision, lattice, origin);
+        WholeCloud { resolution, nearest: NearestDistances { distances, largest }, complete }
+    }
+}
+
 /// What is to be done, from what the caller gave of radius and number.
 enum Job {
     Neighborhood(Neighborhood),
@@ -73,6 +87,15 @@ impl Job {
         if let Self::Radii(radii) = self { radii.len() } else { 1 }
     }
 
+    /// As a part of a whole cloud does it.
+    fn of_part(&self) -> PyResult<PartSize> {
+        match self {
+            Self::Neighborhood(neighborhood) => Ok(PartSize::Of(*neighborhood)),
+            Self::AutoRadius => Ok(PartSize::Auto),
+            Self::Radii(_) => Err(PyValueError::new_err("a part of a cloud has one radius")),
+        }
+    }
+
     fn run(
         &self,
         cloud: &PointCloud<'_>,
@@ -90,9 +113,10 @@ impl Job {
     }
 }
 
-/// Extract curvature, once for each radius; see `surfsig.extract` for what the arguments and the arrays mean.
+/// Extract curvature, once for each radius; see `surfsig.extract` for what the arguments and the arrays mean. Of a part
+/// of a cloud, `beyond` has the numbers of the places that looked beyond it.
 #[pyfunction]
-#[pyo3(signature = (points, *, origin, radius, axes, fit, neighbors=None, at=None, viewpoint=None, directions=None, robust=false, threads=None, progress=None))]
+#[pyo3(signature = (points, *, origin, radius, axes, fit, neighbors=None, at=None, viewpoint=None, directions=None, robust=false, threads=None, progress=None, whole=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
 pub fn extract<'py>(
     py: Python<'py>,
@@ -108,6 +132,7 @@ pub fn extract<'py>(
     robust: bool,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
+    whole: Option<Whole>,
 ) -> PyResult<Vec<Bound<'py, PyDict>>> {
     let cloud = points.cloud(origin)?;
     let queries = match &at {
@@ -130,6 +155,15 @@ pub fn extract<'py>(
     let directions = directions.as_ref().map(rows::<f32, 3>).transpose()?;
     let options = ExtractOptions { axes, fit, viewpoint, directions, robust, threads, instruction_set: None };
     let total = queries.len(&cloud) * job.counts();
+    if let Some(whole) = whole {
+        let (size, whole) = (job.of_part()?, whole.cloud(origin));
+        let work =
+            |monitor: &Monitor| surfsig::extract_part(&cloud, size, &queries, &options, &whole, monitor);
+        let (extraction, beyond) = watched(py, Some(total), progress.as_ref(), work)?;
+        let arrays = to_arrays(py, extraction)?;
+        arrays.set_item("beyond", PyArray1::from_iter(py, beyond.into_iter().map(|query| query as u32)))?;
+        return Ok(vec![arrays]);
+    }
     let work = |monitor: &Monitor| job.run(&cloud, &queries, &options, monitor);
     let extractions = watched(py, Some(total), progress.as_ref(), work)?;
     extractions.into_iter().map(|extraction| to_arrays(py, extraction)).collect()
@@ -183,4 +217,30 @@ pub fn coordinate_steps(points: Points<'_>, origin: [f64; 3]) -> PyResult<(f64, 
     let positions = (0..points).filter_map(|i| cloud.position(i));
     let number_step = positions.map(|p| resolution.number_step(p)).fold(0.0, f64::max);
     Ok((number_step, resolution.lattice.into_iter().fold(0.0, f64::max)))
+}
+
+/// Whether all coordinates are float32 numbers, and the steps of the lattice of which they are multiples.
+#[pyfunction]
+#[pyo3(signature = (points, *, origin))]
+pub fn coordinate_resolution(points: Points<'_>, origin: [f64; 3]) -> PyResult<(bool, [f64; 3])> {
+    let resolution = Resolution::of(&points.cloud(origin)?);
+    Ok((resolution.single_precision, resolution.lattice))
+}
+
+/// Numbers of the finite points at which it is looked how far neighbours are, of so many.
+#[pyfunction]
+pub fn sampled_numbers(count: usize) -> Vec<usize> {
+    surfsig::sampled_numbers(count)
+}
+
+/// A few different ones of the places at those points.
+#[pyfunction]
+pub fn different_places(candidates: PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
+    Ok(surfsig::different_places(rows::<f64, 3>(&candidates)?.iter().copied()))
+}
+
+/// Distance from a place to the k-th nearest of some points.
+#[pyfunction]
+pub fn distance_to_nearest(points: PyReadonlyArray2<'_, f64>, place: [f64; 3], k: usize) -> PyResult<f64> {
+    Ok(surfsig::distance_to_nearest(rows::<f64, 3>(&points)?, place, k))
 }

@@ -61,7 +61,10 @@ mod _surfsig {
     #[pymodule_export]
     use crate::e57::{E57Reader, write_e57};
     #[pymodule_export]
-    use crate::extract::{coordinate_steps, extract, voxel_representatives};
+    use crate::extract::{
+        coordinate_resolution, coordinate_steps, different_places, distance_to_nearest, extract,
+        sampled_numbers, voxel_representatives,
+    };
     #[pymodule_export]
     use crate::field::{field_keypoints, field_signatures, match_fields};
     #[pymodule_export]
@@ -95,6 +98,8 @@ mod _surfsig {
         let parameters: Vec<(&str, usize)> = kinds.map(|kind| (kind.name(), kind.parameters())).collect();
         module.add("KIND_PARAMETERS", parameters.into_py_dict(module.py())?)?;
         module.add("FEWEST_SURFACE_POINTS", surfsig::FEWEST_SURFACE_POINTS)?;
+        module.add("FEWEST_AUTO_POINTS", surfsig::FEWEST_AUTO_POINTS)?;
+        module.add("RESOLUTION_SAMPLES", surfsig::RESOLUTION_SAMPLES)?;
         module.add("COARSEST_STEP", surfsig::COARSEST_STEP)?;
         module.add("INSTRUCTION_SET", surfsig::InstructionSet::detect().name())?;
         module.add("OPTIMAL", surfsig::OPTIMAL)?;

@@ -80,8 +80,9 @@ pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
 pub use depth_image::{DepthImage, Judgement, SurfacePlace};
 pub use error::Error;
 pub use extract::{
-    Column, ExtractOptions, Extraction, Neighborhood, Queries, extract, extract_auto_radius,
-    extract_monitored, extract_radii, voxel_representatives,
+    Column, ExtractOptions, Extraction, FEWEST_AUTO_POINTS, NearestDistances, Neighborhood, PartSize,
+    Queries, WholeCloud, different_places, distance_to_nearest, extract, extract_auto_radius,
+    extract_monitored, extract_part, extract_radii, sampled_numbers, voxel_representatives,
 };
 pub use field::{
     FIELD_PHASES, FIELD_SIGNATURE, FieldMatch, FieldOptions, FieldPatches, FieldPhases, FieldPlaces,
@@ -112,7 +113,7 @@ pub use recurrences::{
     judge_poses, refine_poses,
 };
 pub use registration::{REGISTRATION_STEPS, Registration, RegistrationSettings, register};
-pub use resolution::{COARSEST_STEP, Resolution};
+pub use resolution::{COARSEST_STEP, RESOLUTION_SAMPLES, Resolution};
 pub use scan::Scan;
 pub use simd::InstructionSet;
 pub use similarity::{GOOD, OPTIMAL, SimilarityClass, similarity};

@@ -9,7 +9,7 @@ use crate::PointCloud;
 pub const COARSEST_STEP: f64 = 0.2;
 
 /// Points that are looked at for a lattice: neighbouring steps are then among them in all but the widest scans.
-const SAMPLES: usize = 4096;
+pub const RESOLUTION_SAMPLES: usize = 4096;
 
 /// Different values along an axis from which on equal distances between them are a lattice, and not a few faces.
 const FEWEST_LEVELS: usize = 8;
@@ -45,7 +45,7 @@ pub struct Resolution {
 impl Resolution {
     /// Finds the steps, from a sample of the points.
     pub fn of(cloud: &PointCloud<'_>) -> Self {
-        let stride = cloud.len().div_ceil(SAMPLES).max(1);
+        let stride = cloud.len().div_ceil(RESOLUTION_SAMPLES).max(1);
         let sample: Vec<[f64; 3]> =
             (0..cloud.len()).step_by(stride).filter_map(|i| cloud.position(i)).collect();
         let offset = |p: &[f64; 3]| [0, 1, 2].map(|axis| p[axis] - cloud.origin[axis]);
@@ -56,6 +56,18 @@ impl Resolution {
             lattice_step(&mut values)
         });
         Self { single_precision, lattice, origin: cloud.origin }
+    }
+
+    /// As it was found before, for a cloud with this origin.
+    ///
+    /// ```
+    /// use surfsig::{PointCloud, Resolution};
+    /// let points: Vec<[f64; 3]> = (0..400).map(|i| [f64::from(i % 20), f64::from(i / 20), 0.1]).collect();
+    /// let found = Resolution::of(&PointCloud::new_f64(&points));
+    /// assert_eq!(Resolution::known(found.single_precision, found.lattice, [0.0; 3]), found);
+    /// ```
+    pub fn known(single_precision: bool, lattice: [f64; 3], origin: [f64; 3]) -> Self {
+        Self { single_precision, lattice, origin }
     }
 
     /// Distance between neighbouring float32 numbers at a position, the largest of the three axes; 0 for a cloud

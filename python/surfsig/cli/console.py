@@ -131,6 +131,11 @@ def quantity(value: float) -> str:
     return f"{value:.3g}"
 
 
+def size_text(size: float) -> str:
+    """Write bytes short: 1.5 GB."""
+    return f"{quantity(size)}B"
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(name): _plain(part) for name, part in value.items()}

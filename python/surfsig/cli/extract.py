@@ -23,6 +23,14 @@ from surfsig.cli.options import (
     radius_or_auto,
     threads_option,
 )
+from surfsig.cli.tiles import (
+    extract_in_tiles,
+    is_tiled,
+    refuse_in_tiles,
+    refuse_too_large,
+    split_options,
+    tile_options,
+)
 from surfsig.digits import position_text
 
 if TYPE_CHECKING:
@@ -37,7 +45,7 @@ QUANTILES = (0.05, 0.5, 0.95)
 
 
 @click.command("extract", no_args_is_help=True)
-@click.argument("file", type=CLOUD)
+@click.argument("files", type=CLOUD, nargs=-1, required=True)
 @click.option(
     "--radius",
     type=radius_or_auto,
@@ -56,7 +64,8 @@ QUANTILES = (0.05, 0.5, 0.95)
     "--output",
     type=CLOUD,
     required=True,
-    help="A .ply, .pcd, .las, .laz, .e57, .npz, .parquet, .csv or .xyz file.",
+    help="A .ply, .pcd, .las, .laz, .e57, .npz, .parquet, .csv or .xyz file; or a folder, for clouds "
+    "of any size: they are worked on in tiles, a file each.",
 )
 @click.option("--signatures", is_flag=True, help="Write the signature of each point too (242 numbers).")
 @click.option(
@@ -78,13 +87,14 @@ QUANTILES = (0.05, 0.5, 0.95)
 @click.option(
     "--viewpoint", type=position, metavar="X,Y,Z", help="Where the sensor stood, if the file does not say."
 )
+@tile_options
 @input_options
 @threads_option
 @json_option
 @click.option("--robust", is_flag=True, help="Leave out points that are far from the fitted surface.")
 @quiet_option
 def extract_command(
-    file: Path,
+    files: tuple[Path, ...],
     radius: float | Literal["auto"] | None,
     neighbors: int | None,
     output: Path,
@@ -99,9 +109,9 @@ def extract_command(
     as_json: bool,
     robust: bool,
     quiet: bool,
-    **reading: Any,
+    **more: Any,
 ) -> None:
-    """Write the points of FILE with their signed curvature, normals and quality.
+    """Write the points of FILES with their signed curvature, normals and quality.
 
     The output has the input's points and fields, and k1, k2, gaussian_curvature, mean_curvature (per unit of
     length; a bump seen from the sensor is positive), nx ny nz, direction_x _y _z (along k1), the standard
@@ -109,12 +119,16 @@ def extract_command(
     planarity, scattering; zeta with --like; radius with --neighbors or --radius auto. NaN where there is no
     value.
 
+    Where the output is a folder, clouds need not fit into memory: they are worked on in tiles, with the same
+    results, and a second call goes on where the first was stopped.
+
     \b
     Examples:
       surfsig extract scan.ply --radius 0.02 -o out.ply
       surfsig extract part.ply --unit mm --radius 0.002 -o out.ply
       surfsig extract scan.pcd --radius 0.02 --signatures -o out.npz
       surfsig extract scan.ply --radius 0.02 --like 0.1,0.2,0.9 -o alike.ply
+      surfsig extract city/*.laz --radius 0.5 -o out/ --memory 4GB
       surfsig extract scan.xyz --radius 0.02 --at 0.1,0.2,0.9 --viewpoint 0,0,0 -o one.parquet
     """  # noqa: D301
     import numpy as np
@@ -125,13 +139,36 @@ def extract_command(
 
     if at and voxel is not None:
         raise click.UsageError("--at and --voxel exclude each other")
-    check_writable(output)
     shown = on_terminal() and not quiet
+    tiling, reading = split_options(more)
+    if is_tiled(output, tiling):
+        refuse_in_tiles(signatures=signatures, like=like, at=at, voxel=voxel, **reading)
+        how_in_tiles = {
+            "radius": radius,
+            "neighbors": neighbors,
+            "axes": axes,
+            "fit": fit,
+            "viewpoint": viewpoint,
+        }
+        extract_in_tiles(
+            files,
+            output,
+            {**how_in_tiles, "robust": robust, "threads": threads},
+            tiling,
+            reading,
+            shown,
+            as_json,
+        )
+        return
+    file = files[0] if len(files) == 1 else files
+    told = str(files[0]) if len(files) == 1 else f"{files[0]} and {len(files) - 1} more"
+    check_writable(output)
+    refuse_too_large(file, told)
     how = {"radius": radius, "neighbors": neighbors, "axes": axes, "fit": fit, "robust": robust}
     clock = [time.perf_counter()]
     with progress_bar("reading", "bytes", shown=shown) as progress:
         cloud = surfsig.read(file, progress=progress, **reading)
-    warn_of_missing_returns(cloud, str(file))
+    warn_of_missing_returns(cloud, told)
     clock.append(time.perf_counter())
     with progress_bar("extracting", "points", shown=shown) as progress:
         extract = partial(
@@ -163,7 +200,7 @@ def extract_command(
         )
     clock.append(time.perf_counter())
     seconds = dict(zip(("read", "extract", "write"), np.diff(clock).tolist(), strict=True))
-    summary: dict[str, Any] = {"input": str(file), "output": str(output), **how}
+    summary: dict[str, Any] = {"input": told, "output": str(output), **how}
     summary |= {"signatures": signatures, **_summary(result, status), "seconds": seconds}
     summary["points_per_second"] = len(result) / seconds["extract"] if seconds["extract"] else None
     if len(result) and not np.isfinite(result.k1).any():

@@ -20,7 +20,9 @@ from surfsig.digits import position_text
 def info_command(file: Path, as_json: bool, **reading: Any) -> None:
     """Show what a point cloud FILE holds, and how dense it is.
 
-    FILE may be a folder or a pattern, as for all commands: its files are then one cloud.
+    FILE may be a folder or a pattern, as for all commands: its files are then one cloud. Of a folder or a
+    pattern of LAS, LAZ or COPC files, and of one that `surfsig extract` wrote tiles into, only the headers
+    are read.
 
     \b
     Examples:
@@ -29,8 +31,17 @@ def info_command(file: Path, as_json: bool, **reading: Any) -> None:
       surfsig info 'tiles/*.laz'
       surfsig info tile.copc.laz --box 500100,4500200,0,500110,4500210,50
     """  # noqa: D301
+    from surfsig.cli.info_of_many import summary_of_many
     from surfsig.files import format_name, read
 
+    many = None if any(value is not None for value in reading.values()) else summary_of_many(file)
+    if many is not None:
+        values, rows = many
+        if as_json:
+            print_json(values)
+        else:
+            print_table(str(file), rows, err=False)
+        return
     with progress_bar("reading", "bytes", shown=on_terminal()) as progress:
         cloud = read(file, progress=progress, **reading)
     _warn_of_feet(file, cloud)

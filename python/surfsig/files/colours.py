@@ -35,6 +35,11 @@ _NAMES = {
 _ROUNDING = 1e-6
 
 
+def is_colour(name: str) -> bool:
+    """Tell whether a field of this name may be a colour."""
+    return name.lower() in _NAMES
+
+
 def with_colours(
     fields: Mapping[str, NDArray[Any]],
     *,

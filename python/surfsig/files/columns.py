@@ -63,6 +63,7 @@ def cloud_from_columns(
     decimals: Collection[str] | None = None,
     error: type[SurfsigError] = FileFormatError,
     unit: str | None = None,
+    typed_colours: bool = True,
 ) -> PointCloud:
     """Make a cloud of named columns; those that are no coordinates are its fields.
 
@@ -87,6 +88,8 @@ def cloud_from_columns(
         What is raised if a coordinate is missing, is no number, or may be several columns.
     unit
         What the caller says that the coordinates' unit is.
+    typed_colours
+        Whether colours get the type that says what they mean, which all points of a file tell together.
 
     Warns
     -----
@@ -136,10 +139,11 @@ def cloud_from_columns(
     if declared_float32:
         offsets = _narrowed(offsets)
     others = {name: _native(values) for name, values in columns.items() if name not in axes}
+    fields = _with_normals(others)
     return PointCloud(
         offsets,
         viewpoint=None if viewpoint is None else np.asarray(viewpoint, dtype=np.float64),
-        fields=with_colours(_with_normals(others), decimals=decimals, source=source),
+        fields=with_colours(fields, decimals=decimals, source=source) if typed_colours else fields,
         grid=grid,
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -16,7 +17,16 @@ from surfsig.files.colours import with_colours
 from surfsig.files.columns import blocks_of
 from surfsig.files.las_counts import LARGEST_HEADER, Held, agreed_count, end_of_points
 from surfsig.files.las_header import RECORD_ID, USER_ID, check_coordinates, read_header
-from surfsig.files.laz_chunks import PIECE_BYTES, Chunk, copc_chunks, decoded, laz_chunks, one_line_errors
+from surfsig.files.laz_chunks import (
+    PIECE_BYTES,
+    Chunk,
+    CopcNode,
+    copc_chunks,
+    copc_nodes,
+    decoded,
+    laz_chunks,
+    one_line_errors,
+)
 from surfsig.files.options import inside
 from surfsig.point_cloud import PointCloud
 from surfsig.progress import Progress
@@ -52,40 +62,116 @@ def read(
     UserWarning
         If the header contradicts the file in its number of points, where they start or their extra bytes.
     """
-    size = os.fstat(file.fileno()).st_size
-    header, promised, coordinate_system = read_header(file, source, size)
-    chunks = _chunks(file, header, promised, box, source, size)
-    if header.point_count:
-        check_coordinates(header, source)
-    origin = np.array(header.offsets)
-    columns = _Columns(header.point_count)
-    for block in _blocks(file, header, chunks, source, progress):
-        offsets = np.column_stack([block[axis] * header.scales[i] for i, axis in enumerate("XYZ")])
-        if box is not None:
-            chosen = inside(offsets, origin, box)
-            block, offsets = block[chosen], offsets[chosen]
-        with one_line_errors(source):
-            columns.append({_COORDINATES: offsets, **_fields(block, header)})
-    progress.advance(size)
-    fields = columns.finished()
-    offsets = fields.pop(_COORDINATES)
+    opened = OpenLas(file, source, progress, box)
+    columns = _Columns(opened.header.point_count)
+    for block in opened.columns():
+        columns.append(block)
+    cloud = opened.cloud(columns.finished())
     with one_line_errors(source):
-        told = _told(header)
-        if "dimensions" in told:
-            fields = {
-                name: values
-                for name, values in fields.items()
-                if name in told["dimensions"] or not _is_empty_dimension(name, values, header)
-            }
-        grid = told.get("grid") if box is None else None
-        return PointCloud(
-            offsets,
-            origin,
-            told.get("viewpoint"),
-            with_colours(fields, bytes_in_16_bits=True),
-            tuple(grid) if grid else None,
-            coordinate_system=coordinate_system,
+        fields = {
+            name: values
+            for name, values in cloud.fields.items()
+            if name not in opened.usual or not (values == opened.usual[name]).all()
+        }
+        grid = opened.told.get("grid") if box is None else None
+        return replace(
+            cloud, fields=with_colours(fields, bytes_in_16_bits=True), grid=tuple(grid) if grid else None
         )
+
+
+class OpenLas:
+    """An open LAS, LAZ or COPC file: what its header says, and its points block by block.
+
+    Parameters
+    ----------
+    file, source, progress, box
+        As `read` takes them.
+
+    Attributes
+    ----------
+    header
+        As laspy has it.
+    told
+        What this library's writer told beside the points.
+    usual
+        Of a file that surfsig wrote: the dimensions that are no fields where all points have this value.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is cut off or broken.
+    """
+
+    def __init__(
+        self, file: BinaryIO, source: str, progress: Progress, box: NDArray[np.float64] | None = None
+    ) -> None:
+        self._file, self._source, self._progress, self._box = file, source, progress, box
+        self._size = os.fstat(file.fileno()).st_size
+        self.header, promised, self._coordinate_system = read_header(file, source, self._size)
+        self._chunks = _chunks(file, self.header, promised, box, source, self._size)
+        if self.header.point_count:
+            check_coordinates(self.header, source)
+        with one_line_errors(source):
+            self.told = _told(self.header)
+            names = self.header.point_format.standard_dimension_names
+            filled = self.told.get("dimensions", names)
+            self.usual = {name: _usual(name) for name in names if name not in filled}
+
+    def columns(self) -> Iterator[dict[str, NDArray[Any]]]:
+        """Give the points block by block, the first one without any: offsets (n, 3), and fields by name."""
+        header, origin = self.header, np.array(self.header.offsets)
+        for block in _blocks(self._file, header, self._chunks, self._source, self._progress):
+            offsets = np.column_stack([block[axis] * header.scales[i] for i, axis in enumerate("XYZ")])
+            if self._box is not None:
+                chosen = inside(offsets, origin, self._box)
+                block, offsets = block[chosen], offsets[chosen]
+            with one_line_errors(self._source):
+                yield {_COORDINATES: offsets, **_fields(block, header)}
+        self._progress.advance(self._size)
+
+    def nodes(self) -> list[CopcNode] | None:
+        """Give the nodes of the octree with their chunks, which are then all of the file's; else None."""
+        everywhere = np.array([[-np.inf] * 3, [np.inf] * 3])
+        found = copc_nodes(self._file, self.header, everywhere, self._source, self._size)
+        whole = found is not None and [node.chunk for node in found] == self._chunks
+        return found if whole else None
+
+    def only(self, chunks: list[Chunk]) -> None:
+        """Give no points but those of some chunks from now on."""
+        self._chunks = chunks
+
+    def only_beginnings(self, share: int) -> bool:
+        """Give of each chunk no more than one part in `share` from now on; tell whether there are chunks."""
+        self.only([Chunk(place, size, -(-points // share)) for place, size, points in self._chunks])
+        return bool(self._chunks)
+
+    def cloud(self, columns: dict[str, NDArray[Any]]) -> PointCloud:
+        """Make a cloud of columns, with all dimensions, and colours as they are stored."""
+        fields = dict(columns)
+        offsets = fields.pop(_COORDINATES)
+        with one_line_errors(self._source):
+            return PointCloud(
+                offsets,
+                np.array(self.header.offsets),
+                self.told.get("viewpoint"),
+                fields,
+                coordinate_system=self._coordinate_system,
+            )
+
+    def clouds(self, points: int) -> Iterator[PointCloud]:
+        """Give the points in clouds of so many, or a few more, as `cloud` makes them."""
+        blocks, count = [], 0
+        for block in self.columns():
+            blocks.append(block)
+            count += len(block[_COORDINATES])
+            if count >= points:
+                yield self.cloud(_stacked(blocks))
+                blocks, count = [{name: values[:0] for name, values in block.items()}], 0
+        yield self.cloud(_stacked(blocks))
+
+
+def _stacked(blocks: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
 
 class _Columns:
@@ -190,7 +276,6 @@ def _told(header: LasHeader) -> dict[str, Any]:
     return {}
 
 
-def _is_empty_dimension(name: str, values: NDArray[Any], header: LasHeader) -> bool:
-    """Tell whether a dimension of the point format holds only what every point without it has."""
-    usual = 1 if name in ("return_number", "number_of_returns") else 0
-    return name in header.point_format.standard_dimension_names and bool((values == usual).all())
+def _usual(name: str) -> int:
+    """Give what every point without it has of a dimension of the point format."""
+    return 1 if name in ("return_number", "number_of_returns") else 0

@@ -157,15 +157,30 @@ def _held(
     return Held(total - points + 1, total)
 
 
-@np.errstate(over="ignore", invalid="ignore")
 def copc_chunks(
     file: BinaryIO, header: LasHeader, box: NDArray[np.float64], source: str, size: int
 ) -> list[Chunk] | None:
-    """Find the chunks of the octree's nodes that touch a box, in the file's order.
+    """Find the chunks of the octree's nodes that touch a box, as `copc_nodes` does."""
+    nodes = copc_nodes(file, header, box, source, size)
+    return None if nodes is None else [node.chunk for node in nodes]
+
+
+class CopcNode(NamedTuple):
+    """A node of the octree that has points: their chunk, and the middle of its cube."""
+
+    chunk: Chunk
+    middle: tuple[float, float, float]
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def copc_nodes(
+    file: BinaryIO, header: LasHeader, box: NDArray[np.float64], source: str, size: int
+) -> list[CopcNode] | None:
+    """Find the octree's nodes that touch a box and have points, in the file's order.
 
     Returns
     -------
-    list of Chunk or None
+    list of CopcNode or None
         None if the file is no COPC file, or its octree's cube does not enclose its points.
 
     Raises
@@ -183,7 +198,7 @@ def copc_chunks(
         return None
     _laszip_record(header, source)
     pages = [(int(info.hierarchy_root_offset), int(info.hierarchy_root_size))]
-    chunks: list[Chunk] = []
+    nodes: list[CopcNode] = []
     seen = 0
     while pages:
         offset, length = pages.pop()
@@ -196,13 +211,14 @@ def copc_chunks(
         side = 2 * info.halfsize * 2.0 ** -entries["level"][:, None].astype(np.float64)
         corner = low + entries["cell"] * side
         touches = ((corner - margin <= box[1]) & (corner + side + margin >= box[0])).all(axis=1)
-        for entry in entries[touches]:
+        for entry, middle in zip(entries[touches], (corner + side / 2)[touches].tolist(), strict=True):
             place, length, points = (int(entry[name]) for name in ("offset", "size", "points"))
             if points == -1:
                 pages.append((place, length))
             elif points:
-                chunks.append(Chunk(place, length, points))
-    chunks.sort()
+                nodes.append(CopcNode(Chunk(place, length, points), tuple(middle)))
+    nodes.sort()
+    chunks = [node.chunk for node in nodes]
     if (
         any(chunk.size < 0 or chunk.points < 0 for chunk in chunks)
         or any(first.offset + first.size > second.offset for first, second in pairwise(chunks))
@@ -212,7 +228,7 @@ def copc_chunks(
         raise FileFormatError(
             f"{source}: the COPC octree is cut off or broken: its nodes hold more than the file"
         )
-    return chunks
+    return nodes
 
 
 def decoded(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -23,7 +25,7 @@ from surfsig.files.columns import (
     scalar_columns,
 )
 from surfsig.files.lines import take_rows
-from surfsig.files.ply_elements import element_blocks, skip_element
+from surfsig.files.ply_elements import Element, element_blocks, skip_element
 from surfsig.files.ply_faces import Faces
 from surfsig.files.ply_header import read_header
 from surfsig.files.rows import write_rows
@@ -108,6 +110,52 @@ def read(file: BinaryIO, source: str, progress: Progress, samples: int | None = 
     mesh.check_vertices(cloud.offsets, source)
     triangles = mesh.fans(*faces.lists.joined(), len(cloud), source)
     return mesh.sampled(cloud.offsets, triangles, samples, source)
+
+
+def clouds(file: BinaryIO, source: str, progress: Progress) -> Iterator[PointCloud] | None:
+    """Give an open file's vertices block by block, with colours as they are stored, and without faces.
+
+    Returns
+    -------
+    Iterator of PointCloud or None
+        None where the file must be read as one: ASCII, and properties of the same name.
+
+    Raises
+    ------
+    FileFormatError
+        As `read`.
+    """
+    header = read_header(file, source, os.fstat(file.fileno()).st_size)
+    position = header.vertex(source)
+    vertex = header.elements[position]
+    if not header.order or vertex.rename_twice():
+        return None
+    return _clouds(file, header.elements, position, header.notes, source, progress)
+
+
+def _clouds(
+    file: BinaryIO,
+    elements: Sequence[Element],
+    position: int,
+    notes: Mapping[str, str],
+    source: str,
+    progress: Progress,
+) -> Iterator[PointCloud]:
+    for element in elements[:position]:
+        skip_element(file, element, source, progress)
+    dtype = elements[position].single_dtype()
+    for block in itertools.chain(
+        [np.empty(0, dtype)], element_blocks(file, elements[position], source, progress)
+    ):
+        yield replace(
+            cloud_from_columns(
+                filled_columns(dtype, len(block), [block]),
+                source=source,
+                viewpoint=_numbers(notes.get("viewpoint", ""), 3),
+                typed_colours=False,
+            ),
+            coordinate_system=CoordinateSystem.from_text(notes.get("coordinate_system", "")),
+        )
 
 
 def write(

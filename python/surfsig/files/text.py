@@ -57,16 +57,7 @@ def read(
         If `columns` has not a name for each, or there is no such scan.
     """
     file = decoded(file)
-    start = file.tell()
-    head = part = file.read(_HEAD_BYTES)
-    while (
-        head.count(b"\n") + head.count(b"\r") < _HEAD_LINES
-        and len(part) == _HEAD_BYTES
-        and len(head) < _MOST_HEAD_BYTES
-    ):
-        head += (part := file.read(_HEAD_BYTES))
-    layout = layout_of(head, len(part) < _HEAD_BYTES, source, columns)
-    file.seek(start)
+    layout = _layout(file, source, columns)
     tables = _tables(file, layout, source, progress)
     _warn_of_counts(tables, source)
     if scan is not None:
@@ -85,6 +76,65 @@ def read(
         ],
         source,
     )
+
+
+def clouds(
+    file: BinaryIO,
+    source: str,
+    progress: Progress,
+    *,
+    columns: Sequence[str] | None = None,
+    unit: str | None = None,
+) -> tuple[Layout, Iterator[PointCloud]] | None:
+    """Give an open file's points block by block, with colours as the text has them.
+
+    Returns
+    -------
+    Layout and iterator of PointCloud, or None
+        None where the file must be read as one: several scans, or a list in brackets.
+
+    Raises
+    ------
+    FileFormatError, InvalidInputError
+        As `read`.
+    """
+    file = decoded(file)
+    layout = _layout(file, source, columns)
+    if layout.count is not None or layout.brackets:
+        return None
+    return layout, _clouds(file, layout, source, progress, unit)
+
+
+def _clouds(
+    file: BinaryIO, layout: Layout, source: str, progress: Progress, unit: str | None
+) -> Iterator[PointCloud]:
+    names = [layout.names[i] for i in layout.kept]
+    for block in _without_bad_end(line_blocks(file, 1, progress), layout, source):
+        skip = max(layout.skip + 1 - block.first, 0)
+        table = _parsed(block.lines[skip:], block.first + skip, layout, source)
+        yield cloud_from_columns(
+            {name: table[:, i] for i, name in enumerate(names)},
+            source=source,
+            viewpoint=layout.viewpoint,
+            decimals=layout.decimals,
+            unit=unit,
+            typed_colours=False,
+        )
+
+
+def _layout(file: BinaryIO, source: str, columns: Sequence[str] | None) -> Layout:
+    """Tell by the first lines how a text is to be read, and leave the file where it is."""
+    start = file.tell()
+    head = part = file.read(_HEAD_BYTES)
+    while (
+        head.count(b"\n") + head.count(b"\r") < _HEAD_LINES
+        and len(part) == _HEAD_BYTES
+        and len(head) < _MOST_HEAD_BYTES
+    ):
+        head += (part := file.read(_HEAD_BYTES))
+    layout = layout_of(head, len(part) < _HEAD_BYTES, source, columns)
+    file.seek(start)
+    return layout
 
 
 def _tables(

@@ -1,14 +1,14 @@
 //! For each query the largest ball that one surface still explains.
 
 use super::explained::Shown;
-use super::neighborhood::distances_to_nearest;
+use super::neighborhood::NearestDistances;
 use super::radii::run_group;
 use super::{ExtractOptions, Extraction, Queries, check, with_some};
 use crate::threads::with_threads;
-use crate::{Error, Monitor, PointCloud, Radius, Status};
+use crate::{Error, Monitor, PointCloud, Radius, Resolution, Status};
 
-/// Fewest points of a ball that counts: ten more than a paraboloid has unknowns.
-const FEWEST: u32 = 16;
+/// Fewest points of a ball whose radius is chosen automatically: ten more than a paraboloid has unknowns.
+pub const FEWEST_AUTO_POINTS: u32 = 16;
 
 /// Most points of a ball: errors are then small, and a ball that is more would only be slower.
 const MOST: u32 = 10_000;
@@ -60,24 +60,49 @@ pub fn extract_auto_radius(
     options: &ExtractOptions<'_>,
     monitor: &Monitor,
 ) -> Result<Extraction, Error> {
+    check_auto(cloud, queries, options)?;
+    with_threads(options.threads, || {
+        let nearest = NearestDistances::of(cloud, FEWEST_AUTO_POINTS as usize, monitor)?;
+        let (mut best, _) = run_auto(cloud, &nearest, queries, options, monitor)?;
+        best.mark_too_coarse(&Resolution::of(cloud), cloud, queries);
+        Ok(best)
+    })?
+}
+
+/// What the options and the queries ask for together.
+pub(super) fn check_auto(
+    cloud: &PointCloud<'_>,
+    queries: &Queries<'_>,
+    options: &ExtractOptions<'_>,
+) -> Result<(), Error> {
     check(cloud, queries, options)?;
     if options.axes == crate::FitAxes::Sensor {
         return Err(Error::AutoRadiusInSensorAxes);
     }
-    with_threads(options.threads, || {
-        let (distances, largest) = distances_to_nearest(cloud, FEWEST as usize, monitor)?;
-        let nearest = distances.iter().copied().find(|&d| d > 0.0).unwrap_or(1.0);
-        let step = 2.0 * nearest.max(1e-9 * largest.max(1e-6)).log2();
-        // Passes are counted from a radius of one unit, so that where the first begins costs time, and changes nothing
-        // but how far the last one reaches.
-        // Beyond its limits no radius is valid, which the first pass then says.
-        let first = (step / f64::from(STEPS - 1)).floor().clamp(-LIMIT, LIMIT) as i32;
-        let mut climb = Climb { cloud, queries, options, monitor, lowest: first - PASSES_BELOW, found: None };
-        climb.from(first, (0..queries.len(cloud)).collect())?;
-        let (mut best, _) = climb.found.expect("the first pass has found something for all");
-        best.mark_too_coarse(cloud, queries);
-        Ok(best)
-    })?
+    Ok(())
+}
+
+/// The same, on the threads that are there, where it is known how far neighbours are; and for each query the largest
+/// radius that it looked at.
+pub(super) fn run_auto(
+    cloud: &PointCloud<'_>,
+    nearest: &NearestDistances,
+    queries: &Queries<'_>,
+    options: &ExtractOptions<'_>,
+    monitor: &Monitor,
+) -> Result<(Extraction, Vec<f64>), Error> {
+    let distance = nearest.distances.iter().copied().find(|&d| d > 0.0).unwrap_or(1.0);
+    let step = 2.0 * distance.max(1e-9 * nearest.largest.max(1e-6)).log2();
+    // Passes are counted from a radius of one unit, so that where the first begins costs time, and changes nothing
+    // but how far the last one reaches.
+    // Beyond its limits no radius is valid, which the first pass then says.
+    let first = (step / f64::from(STEPS - 1)).floor().clamp(-LIMIT, LIMIT) as i32;
+    let count = queries.len(cloud);
+    let lowest = first - PASSES_BELOW;
+    let mut climb = Climb { cloud, queries, options, monitor, lowest, found: None, reach: vec![0.0; count] };
+    climb.from(first, (0..count).collect())?;
+    let (best, _) = climb.found.expect("the first pass has found something for all");
+    Ok((best, climb.reach))
 }
 
 /// The radius of a step.
@@ -95,6 +120,8 @@ struct Climb<'a> {
     lowest: i32,
     /// The best balls so far, and for each the next smaller one.
     found: Option<(Extraction, Extraction)>,
+    /// The largest radius that each query looked at.
+    reach: Vec<f64>,
 }
 
 impl Climb<'_> {
@@ -107,6 +134,9 @@ impl Climb<'_> {
             let steps = (0..STEPS).map(|step| pass * (STEPS - 1) + step);
             let radii = steps.map(radius_of).collect::<Result<Vec<Radius>, Error>>()?;
             let balls = self.balls(&radii, &numbers)?;
+            // The axes of smaller balls begin with those of the largest.
+            let largest = radii[radii.len() - 1].get();
+            numbers.iter().for_each(|&query| self.reach[query] = self.reach[query].max(largest));
             let (mut lower, mut ended, mut best) = (Vec::new(), Vec::new(), vec![None; numbers.len()]);
             let mut place = 0..numbers.len();
             active.retain_mut(|(query, growth)| {
@@ -178,7 +208,7 @@ impl Climb<'_> {
 
 /// Whether a ball holds enough points, and a surface.
 fn begins(ball: &Extraction, place: usize) -> bool {
-    ball.count[place] >= FEWEST && matches!(ball.status[place], Status::Ok | Status::OneSided)
+    ball.count[place] >= FEWEST_AUTO_POINTS && matches!(ball.status[place], Status::Ok | Status::OneSided)
 }
 
 /// How a query's ball has grown.

@@ -99,8 +99,12 @@ impl Extraction {
     }
 
     /// Marks the queries whose coordinates are too coarse for their radius, and takes their curvature away.
-    pub(super) fn mark_too_coarse(&mut self, cloud: &PointCloud<'_>, queries: &Queries<'_>) {
-        let resolution = Resolution::of(cloud);
+    pub(super) fn mark_too_coarse(
+        &mut self,
+        resolution: &Resolution,
+        cloud: &PointCloud<'_>,
+        queries: &Queries<'_>,
+    ) {
         if !resolution.single_precision && resolution.lattice == [0.0; 3] {
             return;
         }

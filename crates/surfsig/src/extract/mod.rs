@@ -11,22 +11,25 @@ mod radii;
 mod region;
 mod robust;
 mod shares;
+mod whole_cloud;
 mod worker;
 
-pub use auto_radius::extract_auto_radius;
+pub use auto_radius::{FEWEST_AUTO_POINTS, extract_auto_radius};
 pub use extraction::{Column, Extraction};
-pub use neighborhood::Neighborhood;
+pub use neighborhood::{
+    NearestDistances, Neighborhood, different_places, distance_to_nearest, sampled_numbers,
+};
 pub use queries::{Queries, voxel_representatives};
 pub use radii::extract_radii;
+pub use whole_cloud::{PartSize, WholeCloud, extract_part};
 
 use crate::cell_index::CellIndex;
 use crate::fit::{FitAxes, FitKind};
 use crate::hierarchy::DENSE;
 use crate::simd::InstructionSet;
 use crate::threads::with_threads;
-use crate::{Error, Monitor, PointCloud, Radius};
+use crate::{Error, Monitor, PointCloud, Radius, Resolution};
 use extraction::{Columns, ColumnsPart, Conditions, Entries};
-use neighborhood::first_radius;
 use rayon::prelude::*;
 use shares::{Share, shares};
 use std::sync::Mutex;
@@ -113,7 +116,7 @@ pub fn extract_monitored(
     check(cloud, queries, options)?;
     let mut found =
         with_threads(options.threads, || extract_within(cloud, neighborhood, queries, options, monitor))??;
-    found.mark_too_coarse(cloud, queries);
+    found.mark_too_coarse(&Resolution::of(cloud), cloud, queries);
     Ok(found)
 }
 
@@ -131,7 +134,10 @@ pub(crate) fn extract_within(
                 .of_balls
                 .swap_remove(0))
         }
-        Neighborhood::Nearest(k) => run_nearest(cloud, k, queries, options, monitor),
+        Neighborhood::Nearest(k) => {
+            let first = NearestDistances::of(cloud, k, monitor)?.first_radius()?;
+            Ok(run_nearest(cloud, k, first, queries, options, monitor)?.0)
+        }
     }
 }
 
@@ -147,15 +153,17 @@ fn check(cloud: &PointCloud<'_>, queries: &Queries<'_>, options: &ExtractOptions
     Ok(())
 }
 
-/// Balls that grow until each holds its k nearest points.
+/// Balls that grow from a first radius until each holds its k nearest points; and the radius of each query's last.
 fn run_nearest(
     cloud: &PointCloud<'_>,
     k: usize,
+    first: Radius,
     queries: &Queries<'_>,
     options: &ExtractOptions<'_>,
     monitor: &Monitor,
-) -> Result<Extraction, Error> {
-    let mut radius = first_radius(cloud, k, monitor)?;
+) -> Result<(Extraction, Vec<f64>), Error> {
+    let mut radius = first;
+    let mut reach = vec![radius.get(); queries.len(cloud)];
     let nearest = Neighborhood::Nearest(k);
     let Found { mut of_balls, mut left } =
         run(cloud, &Balls::one(radius), nearest, queries, options, monitor)?;
@@ -168,10 +176,11 @@ fn run_nearest(
             run(cloud, &Balls::one(radius), nearest, queries, options, monitor)
         })?;
         found.radius = radius.get();
+        left.iter().for_each(|&query| reach[query] = radius.get());
         found.take_over(left.iter().copied().zip(0..), &more.of_balls[0]);
         left = more.left.into_iter().map(|i| left[i]).collect();
     }
-    Ok(found)
+    Ok((found, reach))
 }
 
 /// Does something with some of the queries, and with the options that belong to them.

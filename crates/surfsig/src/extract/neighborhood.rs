@@ -62,59 +62,93 @@ impl Neighborhood {
     }
 }
 
-/// A radius that holds k points around three quarters of the points, estimated at a few of them; later
-/// passes double it for those that need more.
-pub(super) fn first_radius(cloud: &PointCloud<'_>, k: usize, monitor: &Monitor) -> Result<Radius, Error> {
-    let (distances, largest) = distances_to_nearest(cloud, k, monitor)?;
-    let most = distances.get(3 * distances.len() / 4).copied().unwrap_or(1.0);
-    let found = distances.into_iter().find(|&d| d >= most && d > 0.0).unwrap_or(1.0);
-    // Not below what float64 can number at these coordinates.
-    Radius::new((1.05 * found).max(1e-12 * largest.max(1e-6)).min(1e17))
+/// Distances to the k-th nearest point at a few places of a cloud, by which a search for neighbours begins.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NearestDistances {
+    /// In the cloud's own unit, the smallest first.
+    pub distances: Vec<f64>,
+    /// The largest coordinate, without its sign.
+    pub largest: f64,
 }
 
-/// Distances to the k-th nearest point, the smallest first, at a few places; and the largest coordinate. Where k
-/// points are in one place, the distance to the nearest other place.
-pub(super) fn distances_to_nearest(
-    cloud: &PointCloud<'_>,
-    k: usize,
-    monitor: &Monitor,
-) -> Result<(Vec<f64>, f64), Error> {
-    let positions: Vec<[f64; 3]> = (0..cloud.len()).filter_map(|i| cloud.position(i)).collect();
-    let largest = positions.iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
-    let mut distances = different_places(&positions)
-        .par_iter()
-        .map(|centre| {
-            monitor.check()?;
-            let square = |p: &[f64; 3]| (0..3).map(|a| (p[a] - centre[a]).powi(2)).sum::<f64>();
-            let mut squares: Vec<f64> = positions.iter().map(square).collect();
-            let nth = k.min(squares.len()) - 1;
-            let (_, &mut square, farther) = squares.select_nth_unstable_by(nth, f64::total_cmp);
-            let positive = |&square: &f64| square > 0.0;
-            let nearest = || farther.iter().copied().filter(positive).min_by(f64::total_cmp);
-            Ok(Some(square).filter(positive).or_else(nearest).unwrap_or(0.0).sqrt())
-        })
-        .collect::<Result<Vec<f64>, Error>>()?;
-    distances.sort_unstable_by(f64::total_cmp);
-    Ok((distances, largest))
+impl NearestDistances {
+    /// At a few places of this cloud.
+    pub(super) fn of(cloud: &PointCloud<'_>, k: usize, monitor: &Monitor) -> Result<Self, Error> {
+        let positions: Vec<[f64; 3]> = (0..cloud.len()).filter_map(|i| cloud.position(i)).collect();
+        let largest = positions.iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
+        let candidates = sampled_numbers(positions.len()).into_iter().map(|i| positions[i]);
+        let mut distances = different_places(candidates)
+            .par_iter()
+            .map(|&place| monitor.check().map(|()| distance_to_nearest(&positions, place, k)))
+            .collect::<Result<Vec<f64>, Error>>()?;
+        distances.sort_unstable_by(f64::total_cmp);
+        Ok(Self { distances, largest })
+    }
+
+    /// A radius that holds k points around three quarters of the points; later passes double it for those that
+    /// need more.
+    pub(super) fn first_radius(&self) -> Result<Radius, Error> {
+        let distances = &self.distances;
+        let most = distances.get(3 * distances.len() / 4).copied().unwrap_or(1.0);
+        let found = distances.iter().copied().find(|&d| d >= most && d > 0.0).unwrap_or(1.0);
+        // Not below what float64 can number at these coordinates.
+        Radius::new((1.05 * found).max(1e-12 * self.largest.max(1e-6)).min(1e17))
+    }
 }
 
-/// A few places, spread over the order of the points. Many points may be in one, as missing returns are at
-/// (0, 0, 0): it counts once.
-fn different_places(positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    let mut places: Vec<[f64; 3]> = Vec::with_capacity(SAMPLES);
-    let mut step = positions.len().div_ceil(SAMPLES).max(1);
+/// Distance from a place to the k-th nearest of some positions, the place's own included. Where k of them are in one
+/// place, the distance to the nearest other place; 0 where there is none.
+///
+/// ```
+/// let positions = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 3.0, 0.0]];
+/// assert_eq!(surfsig::distance_to_nearest(&positions, [0.0; 3], 3), 3.0);
+/// ```
+pub fn distance_to_nearest(positions: &[[f64; 3]], place: [f64; 3], k: usize) -> f64 {
+    let square = |p: &[f64; 3]| (0..3).map(|a| (p[a] - place[a]).powi(2)).sum::<f64>();
+    let mut squares: Vec<f64> = positions.iter().map(square).collect();
+    let Some(nth) = k.min(squares.len()).checked_sub(1) else { return 0.0 };
+    let (_, &mut square, farther) = squares.select_nth_unstable_by(nth, f64::total_cmp);
+    let positive = |&square: &f64| square > 0.0;
+    let nearest = || farther.iter().copied().filter(positive).min_by(f64::total_cmp);
+    Some(square).filter(positive).or_else(nearest).unwrap_or(0.0).sqrt()
+}
+
+/// Numbers of the points, among those that are finite, at which it is looked how far neighbours are; in the order in
+/// which [`different_places`] looks at them.
+///
+/// ```
+/// assert_eq!(surfsig::sampled_numbers(3), [0, 1, 2]);
+/// ```
+pub fn sampled_numbers(count: usize) -> Vec<usize> {
+    let mut numbers = Vec::new();
+    let mut step = count.div_ceil(SAMPLES).max(1);
     let mut offset = 0;
     for _ in 0..ROUNDS {
-        for place in positions.iter().skip(offset).step_by(step) {
-            if places.len() < SAMPLES && !places.contains(place) {
-                places.push(*place);
-            }
-        }
-        if places.len() == SAMPLES || step == 1 {
+        numbers.extend((offset..count).step_by(step));
+        if step == 1 {
             break;
         }
         // Half way between those that were looked at.
         (step, offset) = (step.div_ceil(2), step.div_ceil(2) / 2);
+    }
+    numbers
+}
+
+/// A few different places of those that are looked at. Many points may be in one, as missing returns are at
+/// (0, 0, 0): it counts once.
+///
+/// ```
+/// assert_eq!(surfsig::different_places([[1.0; 3], [1.0; 3], [2.0; 3]]), [[1.0; 3], [2.0; 3]]);
+/// ```
+pub fn different_places(candidates: impl IntoIterator<Item = [f64; 3]>) -> Vec<[f64; 3]> {
+    let mut places: Vec<[f64; 3]> = Vec::with_capacity(SAMPLES);
+    for place in candidates {
+        if places.len() == SAMPLES {
+            break;
+        }
+        if !places.contains(&place) {
+            places.push(place);
+        }
     }
     places
 }

@@ -2,7 +2,7 @@
 
 use super::{Balls, ExtractOptions, Extraction, Found, Neighborhood, Queries, check, run, with_some};
 use crate::threads::with_threads;
-use crate::{Error, Monitor, PointCloud, Radius, Status};
+use crate::{Error, Monitor, PointCloud, Radius, Resolution, Status};
 
 /// Balls that are walked together have radii down to this share of the largest: offsets in float32 are then
 /// exact enough for all.
@@ -59,7 +59,8 @@ pub fn extract_radii(
         Ok(())
     })??;
     let mut found: Vec<Extraction> = found.into_iter().flatten().collect();
-    found.iter_mut().for_each(|of_radius| of_radius.mark_too_coarse(cloud, queries));
+    let resolution = Resolution::of(cloud);
+    found.iter_mut().for_each(|of_radius| of_radius.mark_too_coarse(&resolution, cloud, queries));
     Ok(found)
 }
 
@@ -87,17 +88,18 @@ pub(super) fn run_group(
     if !left.is_empty() {
         // Where most queries are left, all are asked for: that costs less than an index of some.
         let most = 2 * left.len() > of_balls[0].len();
-        let dense: Vec<Extraction> = if most {
+        // The largest ball alone; the smaller ones may yet be walked together.
+        let dense = |queries: &Queries<'_>, options: &ExtractOptions<'_>| {
+            let first = alone(largest, queries, options)?;
+            let smaller = run_group(cloud, &radii[1..], queries, options, monitor)?;
+            Ok::<Vec<Extraction>, Error>(std::iter::once(first).chain(smaller).collect())
+        };
+        let dense = if most {
             let done = of_balls[0].status.iter().filter(|&&status| status != Status::NotFinite).count();
             monitor.take_back(radii.len() * done);
-            radii.iter().map(|&radius| alone(radius, queries, options)).collect::<Result<_, Error>>()?
+            dense(queries, options)?
         } else {
-            // The largest ball alone; the smaller ones may yet be walked together.
-            with_some(queries, options, &left, |queries, options| {
-                let first = alone(largest, queries, options)?;
-                let smaller = run_group(cloud, &radii[1..], queries, options, monitor)?;
-                Ok(std::iter::once(first).chain(smaller).collect())
-            })?
+            with_some(queries, options, &left, dense)?
         };
         let entries =
             left.iter().enumerate().map(|(place, &query)| (query, if most { query } else { place }));

@@ -1,0 +1,216 @@
+"""One task: a tile is read with its halo, extracted, and written as a part."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfsig.curvature import WholeCloud, extract_part
+from surfsig.defaults import Axes, Fit
+from surfsig.errors import FileFormatError
+from surfsig.extraction import Extraction, count_statuses
+from surfsig.files import write
+from surfsig.point_cloud import PointCloud
+from surfsig.tiles.manifest import Record, write_record
+from surfsig.tiles.plan import Plan
+from surfsig.tiles.rows import FileHead
+from surfsig.tiles.sampling import WholeFacts
+from surfsig.tiles.store import TileCloud
+from surfsig.tiles.survey import Unreadable
+
+WIDER = 2.0
+"""By how much a halo grows that did not hold the neighbourhoods of all points."""
+
+TilePoints = Callable[[int, int], object]
+"""Called with the points of a tile that are done, and all of them."""
+
+
+class TileSource(Protocol):
+    """What gives the points of tiles: a store, or files with an index."""
+
+    @property
+    def plan(self) -> Plan:
+        """The tiles."""
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Points of each tile; of files with an index about so many."""
+
+    @property
+    def facts(self) -> WholeFacts:
+        """What is known of all points."""
+
+    @property
+    def heads(self) -> tuple[FileHead, ...]:
+        """What is known of each file."""
+
+    @property
+    def unreadable(self) -> tuple[Unreadable, ...]:
+        """Files that cannot be read."""
+
+    def read(self, tile: int, halo: float) -> TileCloud:
+        """Read a tile and all points within a distance of it."""
+
+    def read_box(self, box: NDArray[np.float64]) -> PointCloud:
+        """Read the points in a box (2, 3), to which both corners belong."""
+
+
+@dataclass(frozen=True)
+class How:
+    """How curvature is extracted; the names are the keywords of `surfsig.extract`."""
+
+    radius: float | Literal["auto"] | None
+    neighbors: int | None
+    axes: Axes
+    fit: Fit
+    viewpoint: tuple[float, float, float] | None
+    robust: bool
+
+    def arguments(self) -> dict[str, Any]:
+        """Give them for the manifest."""
+        viewpoint = None if self.viewpoint is None else list(self.viewpoint)
+        return {
+            "radius": self.radius,
+            "neighbors": self.neighbors,
+            "axes": self.axes,
+            "fit": self.fit,
+            "viewpoint": viewpoint,
+            "robust": self.robust,
+        }
+
+
+@dataclass(frozen=True)
+class ExtractTask:
+    """What makes a tile's part.
+
+    Attributes
+    ----------
+    source
+        What gives the points.
+    out
+        The folder of parts.
+    suffix
+        Of the parts, which says their format.
+    how
+        How curvature is extracted.
+    halo
+        Distance from the tile within which points are read at first.
+    distances
+        How far neighbours are in all of the cloud, where neighbourhoods are no balls of one radius.
+    numbers
+        Whether the parts have a column ``point_number``.
+    """
+
+    source: TileSource
+    out: Path
+    suffix: str
+    how: How
+    halo: float
+    distances: tuple[float, ...]
+    numbers: bool
+
+    def __call__(self, tile: int, threads: int | None = None, progress: TilePoints | None = None) -> Record:
+        """Work on a tile; give its record, with an error where it cannot be read.
+
+        Raises
+        ------
+        OSError
+            If the part cannot be written.
+        """
+        clock, processor = time.perf_counter(), time.process_time()
+        try:
+            points = self.source.read(tile, self.halo)
+        except (OSError, FileFormatError) as error:
+            return {"tile": tile, "error": str(error)}
+        read = len(points.own)
+        if not points.own.any():
+            record: Record = {"tile": tile, "part": None, "bytes": 0, "points": 0, "read": read}
+            write_record(self.out, record)
+            return record
+        try:
+            cloud, columns, status, wider = self._extracted(tile, points, threads, progress)
+        except FileFormatError as error:
+            return {"tile": tile, "error": str(error)}
+        if self.numbers:
+            columns["point_number"] = points.numbers[points.own].astype(np.int64)
+        del points
+        part = self.out / f"tile_{tile:06d}{self.suffix}"
+        notes = {name: str(value) for name, value in self.how.arguments().items() if value is not None}
+        write(part, cloud, columns, notes=notes)
+        record = {
+            "tile": tile,
+            "part": part.name,
+            "bytes": part.stat().st_size,
+            "sha256": _hash(part),
+            "points": len(cloud),
+            "read": read + wider,
+            "status": status,
+            "seconds": round(time.perf_counter() - clock, 3),
+            "processor_seconds": round(time.process_time() - processor, 3),
+        }
+        write_record(self.out, record)
+        return record
+
+    def _extracted(
+        self, tile: int, points: TileCloud, threads: int | None, progress: TilePoints | None
+    ) -> tuple[PointCloud, dict[str, Any], dict[str, int], int]:
+        """Give the tile's own points, their columns and statuses, and how many points were read once more."""
+        found, beyond = self._extract(points, np.flatnonzero(points.own), threads, progress)
+        columns, status = found.columns(), found.status_counts()
+        own = points.cloud.at(points.own)
+        halo, wider = self.halo, 0
+        while len(beyond):
+            halo *= WIDER
+            again = self.source.read(tile, halo)
+            wider += len(again.own)
+            at = np.flatnonzero(again.own)[beyond]
+            more, left = self._extract(again, at, threads, None)
+            for name, values in more.columns().items():
+                if not columns[name].flags.writeable or not columns[name].flags.owndata:
+                    columns[name] = columns[name].copy()
+                columns[name][beyond] = values
+            beyond = beyond[left]
+        if wider:
+            status = count_statuses(columns["status"])
+        return own, columns, status, wider
+
+    def _extract(
+        self,
+        points: TileCloud,
+        at: NDArray[np.int64],
+        threads: int | None,
+        progress: TilePoints | None,
+    ) -> tuple[Extraction, NDArray[np.int64]]:
+        facts = self.source.facts
+        whole = WholeCloud(
+            facts.single_precision, facts.lattice, self.distances, facts.largest, points.complete
+        )
+        found, beyond = extract_part(
+            points.cloud,
+            whole,
+            self.how.radius,
+            neighbors=self.how.neighbors,
+            axes=self.how.axes,
+            fit=self.how.fit,
+            viewpoint=self.how.viewpoint,
+            robust=self.how.robust,
+            at=None if len(at) == len(points.cloud) else at,
+            threads=threads,
+            progress=progress,
+        )
+        return found, beyond.astype(np.int64)
+
+
+def _hash(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while data := file.read(1 << 20):
+            digest.update(data)
+    return digest.hexdigest()
