@@ -53,7 +53,14 @@ from surfsig.missing_returns import remove_missing_returns
 from surfsig.odometry import Odometry, ScanStatus, estimate_odometry
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import EqualSurfaces, Piece, Recurrence, Recurrences, find_recurrences
-from surfsig.registration import Registration, register
+from surfsig.registration import (
+    Alternative,
+    RegisteredPair,
+    RegisteredScans,
+    Registration,
+    register,
+    register_scans,
+)
 from surfsig.shapes import (
     SurfaceAngle,
     SurfaceDistance,
@@ -80,6 +87,7 @@ from surfsig.units import unit_mismatch
 
 __all__ = [
     "INSTRUCTION_SET",
+    "Alternative",
     "Chunks",
     "CoordinateSystem",
     "EqualSurfaces",
@@ -108,6 +116,8 @@ __all__ = [
     "Recurrence",
     "RecurrenceSettings",
     "Recurrences",
+    "RegisteredPair",
+    "RegisteredScans",
     "Registration",
     "RegistrationSettings",
     "ScanSequence",
@@ -146,6 +156,7 @@ __all__ = [
     "read",
     "read_trajectory",
     "register",
+    "register_scans",
     "remove_missing_returns",
     "remove_outliers",
     "similarity",
