@@ -203,7 +203,7 @@ def is_right(found: Array, right: list[Array], extent: float) -> list[bool]:
     ]
 
 
-def measured(case: str, seeds: list[int], detail: bool) -> list[str]:
+def measured(case: str, seeds: list[int], detail: bool, settings: surfsig.RegistrationSettings) -> list[str]:
     """Register all pairs of a case; give its row."""
     trusted_right = trusted = right = named = listed = 0
     seconds = []
@@ -212,7 +212,7 @@ def measured(case: str, seeds: list[int], detail: bool) -> list[str]:
         pair = CASES[case](seed)
         free, equals = pair.free is not None, len(pair.right) > 1
         start = time.process_time()
-        found = surfsig.register(pair.source, pair.target)
+        found = surfsig.register(pair.source, pair.target, settings=settings)
         seconds.append(time.process_time() - start)
         extent = float(np.linalg.norm(np.ptp(pair.target.points, axis=0)))
         agree = is_right(found.T_target_source, pair.right, extent)
@@ -249,7 +249,7 @@ def measured(case: str, seeds: list[int], detail: bool) -> list[str]:
 
 def _is_along(direction: surfsig.FreeDirection, axis: Array | None) -> bool:
     """Whether a free translation is named within 15 degrees of an axis."""
-    if axis is None or direction.kind != "translation" or direction.axis is None:
+    if axis is None or direction.motion != "translation":
         return False
     return bool(abs(np.dot(direction.axis, axis)) > np.cos(np.radians(15.0)))
 
@@ -273,10 +273,20 @@ def main() -> None:
         "--seeds", type=int, nargs=2, default=(100, 120), help="first seed, and the one after the last"
     )
     parser.add_argument("--detail", action="store_true", help="a line for each pair")
+    parser.add_argument(
+        "--setting",
+        nargs=2,
+        action="append",
+        default=[],
+        metavar=("NAME", "VALUE"),
+        help="of RegistrationSettings, as rival_deficit 0.02",
+    )
     parser.add_argument("--write", action="store_true", help="into BENCHMARKS.md")
     arguments = parser.parse_args()
     seeds = list(range(*arguments.seeds))
-    rows = [measured(case, seeds, arguments.detail) for case in arguments.cases]
+    kinds = {name: type(getattr(surfsig.RegistrationSettings(), name)) for name, _ in arguments.setting}
+    settings = surfsig.RegistrationSettings(**{name: kinds[name](value) for name, value in arguments.setting})
+    rows = [measured(case, seeds, arguments.detail, settings) for case in arguments.cases]
     table = markdown_table(COLUMNS, rows)
     notes = [*measured_on(measured_here({})), f"The seeds are {seeds[0]} to {seeds[-1]}."]
     publish("\n\n".join([table, "\n".join(f"- {line}" for line in notes)]), COMMAND, arguments.write)

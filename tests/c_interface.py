@@ -118,7 +118,7 @@ class Registration(Structure):
         ("scale", c_double),
         ("scale_standard_error", c_double),
         ("alternative_count", c_size_t),
-        ("alternatives", Transform * 5),
+        ("alternatives", Transform * 8),
         ("rms", c_double),
         ("radius", c_double),
     )

@@ -68,7 +68,7 @@ def check(found: Registration, expected: surfsig.Registration) -> None:
     for ours, theirs in zip(found.free_directions, expected.free_directions, strict=False):
         np.testing.assert_array_equal(ours.axis[:], theirs.axis)
         np.testing.assert_array_equal(ours.point[:], theirs.point)
-    for name in (*"matches inliers overlap rms radius trusted".split(), *JUDGED):
+    for name in (*["matches", "inliers", "overlap", "rms", "radius", "trusted"], *JUDGED):
         np.testing.assert_equal(getattr(found, name), getattr(expected, name))
     assert bin(found.doubts).count("1") == len(expected.reasons)
     assert found.alternative_count == len(expected.alternatives)

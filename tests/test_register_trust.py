@@ -88,7 +88,7 @@ def test_a_smooth_corridor_is_free_along_itself() -> None:
     )
     found = surfsig.register(source, target)
     assert not found.trusted
-    axes = [free.axis for free in found.free_directions if free.kind == "translation"]
+    axes = [free.axis for free in found.free_directions if free.motion == "translation"]
     assert any(abs(axis[0]) > 0.97 for axis in axes)
 
 

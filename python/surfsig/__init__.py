@@ -55,11 +55,11 @@ from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import EqualSurfaces, Piece, Recurrence, Recurrences, find_recurrences
 from surfsig.registration import (
     Alternative,
+    MultiwayRegistration,
     RegisteredPair,
-    RegisteredScans,
     Registration,
     register,
-    register_scans,
+    register_multiway,
 )
 from surfsig.shapes import (
     SurfaceAngle,
@@ -105,6 +105,7 @@ __all__ = [
     "InvalidInputError",
     "Library",
     "LibraryEntry",
+    "MultiwayRegistration",
     "Odometry",
     "OdometrySettings",
     "Piece",
@@ -117,7 +118,6 @@ __all__ = [
     "RecurrenceSettings",
     "Recurrences",
     "RegisteredPair",
-    "RegisteredScans",
     "Registration",
     "RegistrationSettings",
     "ScanSequence",
@@ -156,7 +156,7 @@ __all__ = [
     "read",
     "read_trajectory",
     "register",
-    "register_scans",
+    "register_multiway",
     "remove_missing_returns",
     "remove_outliers",
     "similarity",

@@ -143,6 +143,12 @@ class RegistrationSettings:
         free_space_margin: float | None = None,
         free_space_relative_margin: float | None = None,
         doubted_free_space: float | None = None,
+        free_space_excess: float | None = None,
+        certain_free_space: float | None = None,
+        certain_inliers: int | None = None,
+        certain_explained: float | None = None,
+        doubted_agreement: float | None = None,
+        mirrored_inliers: float | None = None,
         doubted_scale: float | None = None,
         scale_deviations: float | None = None,
         trusted_inliers: int | None = None,
@@ -227,6 +233,24 @@ class RegistrationSettings:
     @property
     def doubted_free_space(self) -> float:
         """Share of points in free space from which on a transform is doubted."""
+    @property
+    def free_space_excess(self) -> float:
+        """By how much the shares of two transforms must differ for the smaller one to win."""
+    @property
+    def certain_free_space(self) -> float:
+        """Share of points in free space up to which few matches are enough."""
+    @property
+    def certain_inliers(self) -> int:
+        """Matches that agree, from which on a transform is trusted that leaves nothing in free space."""
+    @property
+    def certain_explained(self) -> float:
+        """Share that such a transform explains, at least."""
+    @property
+    def doubted_agreement(self) -> float:
+        """Matches that agree, per match and overlap, below which the source's mirror image is tried."""
+    @property
+    def mirrored_inliers(self) -> float:
+        """How many times as many matches of the mirror image must agree."""
     @property
     def doubted_scale(self) -> float:
         """Logarithm of a scale from which on it is doubted."""

@@ -100,7 +100,7 @@ impl surfsig_free_direction {
 pub const SURFSIG_FREE_DIRECTIONS: usize = 6;
 
 /// Most alternatives that are given.
-pub const SURFSIG_ALTERNATIVES: usize = 5;
+pub const SURFSIG_ALTERNATIVES: usize = 8;
 
 /// A doubt: nothing was found.
 pub const SURFSIG_DOUBT_NOT_FOUND: u32 = 1;
@@ -116,6 +116,8 @@ pub const SURFSIG_DOUBT_FREE_SPACE: u32 = 16;
 pub const SURFSIG_DOUBT_AMBIGUOUS: u32 = 32;
 /// A doubt: the source is larger or smaller than the target.
 pub const SURFSIG_DOUBT_SCALE: u32 = 64;
+/// A doubt: the source's mirror image fits better.
+pub const SURFSIG_DOUBT_MIRRORED: u32 = 128;
 
 fn flag(doubt: &Doubt) -> u32 {
     match doubt {
@@ -126,6 +128,7 @@ fn flag(doubt: &Doubt) -> u32 {
         Doubt::FreeSpace { .. } => SURFSIG_DOUBT_FREE_SPACE,
         Doubt::Ambiguous { .. } => SURFSIG_DOUBT_AMBIGUOUS,
         Doubt::Scale { .. } => SURFSIG_DOUBT_SCALE,
+        Doubt::Mirrored { .. } => SURFSIG_DOUBT_MIRRORED,
     }
 }
 

@@ -79,6 +79,18 @@ settings_class! {
         free_space_relative_margin: f64 = free_space.relative_margin,
         /// Share of points in free space from which on a transform is doubted.
         doubted_free_space: f64 = free_space.doubted_share,
+        /// By how much the shares of two transforms must differ for the smaller one to win.
+        free_space_excess: f64 = free_space.excess,
+        /// Share of points in free space up to which few matches are enough.
+        certain_free_space: f64 = free_space.certain_share,
+        /// Matches that agree, from which on a transform is trusted that leaves nothing in free space.
+        certain_inliers: usize = certain_inliers,
+        /// Share that such a transform explains, at least.
+        certain_explained: f64 = certain_explained,
+        /// Matches that agree, per match and overlap, below which the source's mirror image is tried.
+        doubted_agreement: f64 = doubted_agreement,
+        /// How many times as many matches of the mirror image must agree.
+        mirrored_inliers: f64 = mirrored_inliers,
         /// Logarithm of a scale from which on it is doubted.
         doubted_scale: f64 = doubted_scale,
         /// The same in its standard errors.

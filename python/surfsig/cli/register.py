@@ -153,7 +153,7 @@ def _register_several(
     with progress_bar("reading", "bytes", shown=shown) as progress:
         clouds = [surfsig.read(path, progress=progress, **reading) for path in files]
     with progress_bar("pairs", "pairs", shown=shown) as progress:
-        found = surfsig.register_scans(
+        found = surfsig.register_multiway(
             clouds, names=[str(path) for path in files], radius=radius, threads=threads, progress=progress
         )
     if output is not None:

@@ -1,14 +1,14 @@
-"""How a scan lies in another: `register`; and many in one: `register_scans`."""
+"""How a scan lies in another: `register`; and many in one: `register_multiway`."""
 
+from surfsig.registration.multiway import MultiwayRegistration, RegisteredPair, register_multiway
 from surfsig.registration.registration import Alternative, Registration
 from surfsig.registration.search import register
-from surfsig.registration.several import RegisteredPair, RegisteredScans, register_scans
 
 __all__ = [
     "Alternative",
+    "MultiwayRegistration",
     "RegisteredPair",
-    "RegisteredScans",
     "Registration",
     "register",
-    "register_scans",
+    "register_multiway",
 ]

@@ -106,6 +106,7 @@ pub(super) struct Residual {
 
 /// Source points that lie on the target's surface, after the transform was fitted to them.
 #[allow(non_snake_case)]
+#[derive(Debug, Clone)]
 pub(crate) struct PointToSurface {
     pub T_target_source: RigidTransform,
     /// Of the twist, rotation first, in the target's axes about `center`.

@@ -39,6 +39,11 @@ pub enum Doubt {
         /// Their number.
         alternatives: usize,
     },
+    /// The source's mirror image fits better: one of both has left-handed axes.
+    Mirrored {
+        /// Matches of the mirror image that agree.
+        inliers: usize,
+    },
     /// The source is larger or smaller than the target.
     Scale {
         /// How many times as large as the target the source is.
@@ -69,6 +74,9 @@ impl fmt::Display for Doubt {
             ),
             Self::Ambiguous { alternatives } => {
                 write!(f, "{alternatives} other transform{} explain as much", plural(alternatives))
+            }
+            Self::Mirrored { inliers } => {
+                write!(f, "the source's mirror image fits better: {inliers} of its matches agree")
             }
             Self::Scale { scale, standard_error } => {
                 write!(f, "the source is {scale:.4} +- {standard_error:.4} times as large as the target")

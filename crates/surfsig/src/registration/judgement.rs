@@ -6,25 +6,19 @@ use super::settings::RegistrationSettings;
 use crate::alignment::{Alternative, FreeDirection, PointToSurface, Rivals, TargetSurface};
 use crate::geometry::RigidTransform;
 use crate::random::some_of;
-use crate::scan::CenteredScan;
 
-/// Two scans and the transform that was found, all about the scans' middles.
-pub(super) struct Candidate<'a> {
-    pub source: &'a CenteredScan,
-    pub target: &'a CenteredScan,
-    /// The source's points that were fitted.
-    pub sample: &'a [[f64; 3]],
+/// Two scans about their middles, of which transforms are judged.
+pub(super) struct Judge<'a> {
     pub surface: &'a TargetSurface,
-    pub found: &'a PointToSurface,
-    /// Other transforms that matches proposed.
-    pub proposed: &'a [RigidTransform],
-    /// Matches that agree; `None` where a start was given.
-    pub inliers: Option<usize>,
-    pub voxel: f64,
+    /// The source's points that are fitted.
+    pub sample: &'a [[f64; 3]],
+    pub sensors: BothSensors<'a>,
+    /// Of the patches.
     pub radius: f64,
+    pub settings: &'a RegistrationSettings,
 }
 
-/// What the tests said.
+/// What the tests said of a transform.
 pub(super) struct Judgement {
     pub doubts: Vec<Doubt>,
     pub free_directions: Vec<FreeDirection>,
@@ -33,86 +27,104 @@ pub(super) struct Judgement {
     pub free_space: f64,
     pub scale: f64,
     pub scale_standard_error: f64,
+    /// A rival that explains more, or leaves less in free space.
+    pub better: Option<RigidTransform>,
 }
 
-impl Candidate<'_> {
-    pub fn judged(&self, settings: &RegistrationSettings) -> Judgement {
+impl Judge<'_> {
+    /// Judges a transform beside others that were proposed; `inliers` are the matches that agree, `None` where a start
+    /// was given.
+    pub fn judged(
+        &self,
+        found: &PointToSurface,
+        proposed: &[RigidTransform],
+        inliers: Option<usize>,
+    ) -> Judgement {
+        let settings = self.settings;
         let numbers = some_of(self.sample.len(), settings.rivals.points);
         let some: Vec<[f64; 3]> = numbers.into_iter().map(|i| self.sample[i]).collect();
         let rivals = Rivals {
             surface: self.surface,
             source: &some,
-            best: self.found,
+            best: found,
             radius: self.radius,
             settings: settings.rivals,
             fit: settings.rival_fit,
         };
-        let explained = rivals.explained();
-        let sensors =
-            BothSensors::new(self.source, self.sample, self.target, self.voxel, settings.free_space);
-        let free_space = |transform: &RigidTransform| sensors.free_space(transform);
-        let of_best = free_space(&self.found.T_target_source);
+        let best = rivals.explained();
+        let free_space = self.sensors.free_space(&found.T_target_source);
         let alternatives: Vec<Alternative> = rivals
-            .as_good_as_the_best(&explained, self.proposed)
+            .as_good_as_the_best(&best, proposed)
             .into_iter()
             .map(|(transform, explained)| Alternative {
                 T_target_source: transform,
                 explained,
-                free_space: free_space(&transform),
+                free_space: self.sensors.free_space(&transform),
             })
-            // What a sensor looked through refutes a rival, too.
-            .filter(|rival| !(rival.free_space > settings.free_space.doubted_share))
+            // What a sensor looked through refutes a rival, too. NaN refutes nothing.
+            .filter(|rival| !(rival.free_space > free_space + settings.free_space.excess))
             .collect();
+        let is_better = |rival: &&Alternative| {
+            rival.free_space < free_space - settings.free_space.excess
+                || rival.explained > (1.0 + settings.rivals.deficit) * best.share()
+        };
         let mut judged = Judgement {
+            better: alternatives.iter().find(is_better).map(|rival| rival.T_target_source),
             doubts: Vec::new(),
-            free_directions: rivals.free_directions(&explained),
+            free_directions: rivals.free_directions(&best),
             alternatives,
-            explained: explained.share(),
-            free_space: of_best,
+            explained: best.share(),
+            free_space,
             scale: f64::NAN,
             scale_standard_error: f64::NAN,
         };
-        self.enough(settings, &mut judged.doubts);
-        if !judged.free_directions.is_empty() {
-            judged.doubts.push(Doubt::FreeDirections { count: judged.free_directions.len() });
-        }
-        if of_best > settings.free_space.doubted_share {
-            judged.doubts.push(Doubt::FreeSpace { share: of_best });
-        }
-        if !judged.alternatives.is_empty() {
-            judged.doubts.push(Doubt::Ambiguous { alternatives: judged.alternatives.len() });
-        }
-        self.scale(&rivals, settings, &mut judged);
+        self.scale(&rivals, &mut judged);
+        self.doubt(found, inliers, &mut judged);
         judged
     }
 
-    /// Whether enough speaks for the transform.
-    fn enough(&self, settings: &RegistrationSettings, doubts: &mut Vec<Doubt>) {
-        let overlap = self.found.overlap;
-        let needed = match self.inliers {
+    fn doubt(&self, found: &PointToSurface, inliers: Option<usize>, judged: &mut Judgement) {
+        let settings = self.settings;
+        let doubts = &mut judged.doubts;
+        let is_certain = judged.free_space <= settings.free_space.certain_share
+            && judged.explained >= settings.certain_explained;
+        let needed = if is_certain { settings.certain_inliers } else { settings.trusted_inliers };
+        if let Some(inliers) = inliers.filter(|&inliers| inliers < needed) {
+            doubts.push(Doubt::FewMatches { inliers, needed });
+        }
+        let overlap = found.overlap;
+        let least = match inliers {
             None => settings.trusted_overlap_of_start,
             Some(_) => settings.trusted_overlap,
         };
-        if let Some(inliers) = self.inliers.filter(|&inliers| inliers < settings.trusted_inliers) {
-            doubts.push(Doubt::FewMatches { inliers, needed: settings.trusted_inliers });
-        }
-        if overlap < needed {
+        if overlap < least {
             doubts.push(Doubt::LittleOverlap { overlap });
+        }
+        if !judged.free_directions.is_empty() {
+            doubts.push(Doubt::FreeDirections { count: judged.free_directions.len() });
+        }
+        if judged.free_space > settings.free_space.doubted_share {
+            doubts.push(Doubt::FreeSpace { share: judged.free_space });
+        }
+        if !judged.alternatives.is_empty() {
+            doubts.push(Doubt::Ambiguous { alternatives: judged.alternatives.len() });
         }
     }
 
     /// Whether a source of another size fits better.
-    fn scale(&self, rivals: &Rivals<'_>, settings: &RegistrationSettings, judged: &mut Judgement) {
-        let moved = self.found.T_target_source.transform_points(rivals.source);
-        let Some(scale) = self.surface.scale_of(&moved, &settings.rival_fit) else { return };
-        judged.scale = scale.scale;
-        judged.scale_standard_error = scale.standard_error;
-        let off = scale.scale.ln().abs();
-        let is_significant = off > settings.scale_deviations * scale.standard_error / scale.scale;
-        let (deficit, _) = rivals.explained().deficit_of(&rivals.closeness_of(&scale.points));
-        if is_significant && off > settings.doubted_scale && deficit < 0.0 {
-            let Judgement { scale, scale_standard_error: standard_error, .. } = *judged;
-            judged.doubts.push(Doubt::Scale { scale, standard_error });
+    fn scale(&self, rivals: &Rivals<'_>, judged: &mut Judgement) {
+        let moved = rivals.best.T_target_source.transform_points(rivals.source);
+        let Some(found) = self.surface.scale_of(&moved, &self.settings.rival_fit) else { return };
+        judged.scale = found.scale;
+        judged.scale_standard_error = found.standard_error;
+        let off = found.scale.ln().abs();
+        let is_significant = off > self.settings.scale_deviations * found.standard_error / found.scale;
+        let deficit = rivals.explained().deficit_of(&rivals.closeness_of(&found.points));
+        if is_significant
+            && off > self.settings.doubted_scale
+            && deficit.is_some_and(|(deficit, _)| deficit < 0.0)
+        {
+            judged.doubts.push(Doubt::Scale { scale: found.scale, standard_error: found.standard_error });
         }
     }
 }

@@ -14,10 +14,11 @@ pub use doubt::Doubt;
 pub use result::Registration;
 pub use settings::{FreeSpaceSettings, RegistrationSettings};
 
-use judgement::{Candidate, Judgement};
+use free_space::BothSensors;
+use judgement::{Judge, Judgement};
 
 use crate::alignment::{
-    Alternative, Correspondences, GicpCloud, GicpSettings, TargetSurface, even_sample, gicp,
+    Alternative, Correspondences, GicpCloud, GicpSettings, PointToSurface, TargetSurface, even_sample, gicp,
 };
 use crate::field::{KeypointOptions, keypoints_within, match_fields};
 use crate::geometry::RigidTransform;
@@ -124,27 +125,36 @@ fn registered(
         return Ok(Registration::nothing(radius, count));
     };
     monitor.check()?;
-    let inliers = matches.as_ref().map(|matches| matches.inlier_count(&found.T_target_source));
-    let candidate = Candidate {
-        source,
-        target,
-        sample: &sample,
+    let judge = Judge {
         surface: &surface,
-        found: &found,
-        proposed: &proposals[1..],
-        inliers,
-        voxel,
+        sample: &sample,
+        sensors: BothSensors::new(source, &sample, target, voxel, settings.free_space),
         radius,
+        settings,
     };
-    let Judgement {
-        doubts,
-        free_directions,
-        alternatives,
-        explained,
-        free_space,
-        scale,
-        scale_standard_error,
-    } = candidate.judged(settings);
+    let inliers_of =
+        |found: &PointToSurface| matches.as_ref().map(|matches| matches.inlier_count(&found.T_target_source));
+    let (mut found, mut inliers) = (found.clone(), inliers_of(&found));
+    let mut judged = judge.judged(&found, &proposals[1..], inliers);
+    if let Some(better) =
+        judged.better.and_then(|better| surface.align(&sample, better, &settings.point_to_surface))
+    {
+        let others: Vec<RigidTransform> =
+            proposals[1..].iter().copied().chain([found.T_target_source]).collect();
+        inliers = inliers_of(&better);
+        judged = judge.judged(&better, &others, inliers);
+        found = better;
+    }
+    if let (true, Some(own)) = (judged.doubts.is_empty(), inliers) {
+        let agreement = own as f64 / (count as f64 * found.overlap);
+        if agreement < settings.doubted_agreement {
+            let mirrored = mirrored_inliers(source, target, patch, settings, monitor)?;
+            if mirrored as f64 > settings.mirrored_inliers * own as f64 {
+                judged.doubts.push(Doubt::Mirrored { inliers: mirrored });
+            }
+        }
+    }
+    let Judgement { doubts, free_directions, alternatives, .. } = judged;
     monitor.add(1);
     let in_scans = |transform: RigidTransform| to_target * transform * from_source.inverse();
     let alternatives = alternatives
@@ -161,13 +171,27 @@ fn registered(
         matches: count,
         inliers: inliers.unwrap_or(0),
         overlap: found.overlap,
-        explained,
-        free_space,
-        scale,
-        scale_standard_error,
+        explained: judged.explained,
+        free_space: judged.free_space,
+        scale: judged.scale,
+        scale_standard_error: judged.scale_standard_error,
         rms: found.rms,
         radius,
     })
+}
+
+/// How many matches of the source's mirror image agree with one transform.
+fn mirrored_inliers(
+    source: &CenteredScan,
+    target: &CenteredScan,
+    patch: Radius,
+    settings: &RegistrationSettings,
+    monitor: &Monitor,
+) -> Result<usize, Error> {
+    let thinned = |scan: &CenteredScan| scan.thinned(patch.get() / settings.description_voxels_per_radius);
+    let mirrored = thinned(source).mirrored();
+    let matches = matched(&mirrored, &thinned(target), patch, settings, &monitor.apart())?;
+    Ok(matches.inlier_count(&matches.agreed_transform()))
 }
 
 /// Matches keypoints; where it is not known for both scans from where they were seen, both sides of the source's

@@ -46,7 +46,8 @@ pub struct RegistrationSettings {
     pub min_voxels: usize,
     /// When another transform explains as much.
     pub rivals: RivalSettings,
-    /// How rivals, and sources of another size, are fitted: from farther away than a transform that was refined.
+    /// How rivals, and sources of another size, are fitted: from farther away than a transform that was refined, and
+    /// than a push (8 voxels), so that what is pushed off the surface is seen to be off it.
     pub rival_fit: PointToSurfaceSettings,
     /// When points lie where a sensor looked through.
     pub free_space: FreeSpaceSettings,
@@ -59,6 +60,15 @@ pub struct RegistrationSettings {
     /// without overlap (`benchmarks/registration.py`), and at most 28 with one of 30 pairs of periodic terrains; at
     /// least 62 with a right one of redkitchen, bunny and lidar.
     pub trusted_inliers: usize,
+    /// Matches that agree, from which on a transform is trusted that leaves nothing in free space.
+    pub certain_inliers: usize,
+    /// Share that such a transform explains, at least.
+    pub certain_explained: f64,
+    /// Matches that agree, per match and overlap, below which it is tried whether the source's mirror image fits better:
+    /// 0.2 to 0.3 of mirrored rooms, 0.33 and more of right ones.
+    pub doubted_agreement: f64,
+    /// How many times as many matches of the mirror image must agree.
+    pub mirrored_inliers: f64,
     /// Overlap from which on it is.
     pub trusted_overlap: f64,
     /// Overlap from which on a transform is trusted that the caller gave roughly.
@@ -87,7 +97,7 @@ impl Default for RegistrationSettings {
             min_voxels: 16,
             rivals: RivalSettings::default(),
             rival_fit: PointToSurfaceSettings {
-                max_distance: 6.0,
+                max_distance: 9.0,
                 max_iterations: 10,
                 ..PointToSurfaceSettings::default()
             },
@@ -95,6 +105,10 @@ impl Default for RegistrationSettings {
             doubted_scale: 0.005,
             scale_deviations: 4.0,
             trusted_inliers: 32,
+            certain_inliers: 8,
+            certain_explained: 0.3,
+            doubted_agreement: 0.5,
+            mirrored_inliers: 1.25,
             trusted_overlap: 0.04,
             trusted_overlap_of_start: 0.3,
             threads: None,
@@ -117,8 +131,14 @@ pub struct FreeSpaceSettings {
     pub relative_margin: f64,
     /// Points in sight without which nothing is said.
     pub min_points: usize,
-    /// Share of points in free space from which on a transform is doubted.
+    /// Share of points in free space from which on a transform is doubted: at most 0.009 of those of right ones of
+    /// simulated lidars and depth cameras, 0.005 of a real lidar; 0.024 and more of wrong ones
+    /// (`benchmarks/trust.py`).
     pub doubted_share: f64,
+    /// By how much the shares of two transforms must differ for the smaller one to win.
+    pub excess: f64,
+    /// Share up to which few matches are enough.
+    pub certain_share: f64,
 }
 
 impl Default for FreeSpaceSettings {
@@ -128,7 +148,9 @@ impl Default for FreeSpaceSettings {
             margin: 2.0,
             relative_margin: 0.02,
             min_points: 50,
-            doubted_share: 0.05,
+            doubted_share: 0.02,
+            excess: 0.01,
+            certain_share: 0.005,
         }
     }
 }

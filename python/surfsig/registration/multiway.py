@@ -47,7 +47,7 @@ class RegisteredPair:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RegisteredScans:
+class MultiwayRegistration:
     """Poses of all scans that belong together."""
 
     names: list[str]
@@ -71,7 +71,7 @@ class RegisteredScans:
         """Say what was found."""
         used = sum(pair.used for pair in self.pairs)
         return (
-            f"RegisteredScans({int(self.belongs.sum())} of {len(self.names)} scans belong together, "
+            f"MultiwayRegistration({int(self.belongs.sum())} of {len(self.names)} scans belong together, "
             f"by {used} of {len(self.pairs)} pairs)"
         )
 
@@ -155,7 +155,7 @@ class RegisteredScans:
         return {"reference": self.names[self.reference], "scans": scans, "pairs": pairs}
 
 
-def register_scans(
+def register_multiway(
     clouds: Sequence[PointCloud | ArrayLike],
     *,
     names: Sequence[str] | None = None,
@@ -163,7 +163,7 @@ def register_scans(
     settings: RegistrationSettings | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> RegisteredScans:
+) -> MultiwayRegistration:
     """Find how many scans of one place lie to each other, without a parameter.
 
     All pairs are registered (`register`). Trusted ones join scans to groups; a pair that is not trusted
@@ -184,7 +184,7 @@ def register_scans(
 
     Returns
     -------
-    RegisteredScans
+    MultiwayRegistration
 
     Raises
     ------
@@ -216,7 +216,7 @@ def register_scans(
         RegisteredPair(source, target, result, number in used, float(used.get(number, np.nan)))
         for number, (source, target, result) in enumerate(found)
     ]
-    return RegisteredScans(labels, reference, solution.T_world_scan, solution.covariance, pairs)
+    return MultiwayRegistration(labels, reference, solution.T_world_scan, solution.covariance, pairs)
 
 
 class _Graph:
