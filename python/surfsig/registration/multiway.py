@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 _AGREE = 0.25
 """Radii of a patch by which two poses move a scan's points apart, at most, that are the same one: within
 that, matches agree with a pose."""
+_SEEN_THROUGH = 0.02
+"""Share of points in free space from which on a pose is wrong, as for `register`."""
 _SAMPLE = 500
 """Points of a scan that tell by how much two poses differ."""
 
@@ -35,12 +37,14 @@ class RegisteredPair:
     """Two of the scans."""
 
     source: int
+    """Number of the scan that was moved."""
     target: int
-    """Numbers of the scans."""
+    """Number of the scan that it was moved into."""
     registration: Registration
+    """What `register` found."""
     used: bool
-    """Whether the poses of all scans rest on it: it is trusted, or another pair confirms it, and it agrees
-    with the others."""
+    """Whether the poses of all scans rest on it: it is trusted, or closes a loop of three, and agrees with
+    the others."""
     residual: float
     """Root of its squared residual over its covariance, a sixth of it, after all poses were fitted; NaN where
     it was not used."""
@@ -166,8 +170,8 @@ def register_multiway(
 ) -> MultiwayRegistration:
     """Find how many scans of one place lie to each other, without a parameter.
 
-    All pairs are registered (`register`). Trusted ones join scans to groups; a pair that is not trusted
-    joins, too, where another one of the same scan gives the same pose. A pose graph then makes one
+    All pairs are registered (`register`). Trusted ones join scans to groups; pairs that are not trusted
+    join, too, where three of them close a loop. A pose graph then makes one
     consistent set of poses of the largest group (robust least squares: SciPy), and pairs that disagree with
     it are left out.
 
@@ -271,25 +275,24 @@ class _Graph:
         return max(range(self.count), key=lambda scan: (groups[scan], pairs[scan], -scan))
 
     def _confirmed(self, used: set[int], refused: set[int]) -> set[int]:
-        """Give pairs that are not trusted, but lead a scan to the pose that another pair leads it to."""
-        edges = [self._edge(number) for number in sorted(used)]
-        poses = spanning_poses(self.count, self._reference(used), edges)
-        joined = np.isfinite(poses).all(axis=(1, 2))
-        proposed: dict[int, list[tuple[int, Array]]] = {}
+        """Give pairs that are not trusted, but close a loop of three, in which no other pose explains as much."""
+        pairs = {}
         for number, (source, target, result) in enumerate(self.found):
-            if number in used | refused or not np.isfinite(result.T_target_source).all():
-                continue
-            if joined[target] and not joined[source]:
-                proposed.setdefault(source, []).append((number, poses[target] @ result.T_target_source))
-            elif joined[source] and not joined[target]:
-                back = geometry.inverse(result.T_target_source)
-                proposed.setdefault(target, []).append((number, poses[source] @ back))
+            is_open = len(result.alternatives) > 0 or result.free_space > _SEEN_THROUGH
+            if number in used or not (number in refused or is_open):
+                pairs[target, source] = number
         confirmed = set()
-        for scan, poses_of_scan in proposed.items():
-            for (one, pose), (other, other_pose) in itertools.combinations(poses_of_scan, 2):
-                radius = min(self.found[one][2].radius, self.found[other][2].radius)
-                if self._apart(scan, pose, other_pose) <= _AGREE * radius:
-                    confirmed |= {one, other}
+        for first, second, third in itertools.combinations(range(self.count), 3):
+            corners = ((first, second), (second, third), (first, third))
+            if not all(corner in pairs for corner in corners):
+                continue
+            one, two, both = (self.found[pairs[corner]][2] for corner in corners)
+            chained = one.T_target_source @ two.T_target_source
+            if not np.isfinite(chained @ both.T_target_source).all():
+                continue
+            radius = min(one.radius, two.radius, both.radius)
+            if self._apart(third, chained, both.T_target_source) <= _AGREE * radius:
+                confirmed |= {pairs[corner] for corner in corners}
         return confirmed
 
     def _disagreement(self, number: int, poses: Array) -> float:
