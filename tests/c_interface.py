@@ -104,6 +104,7 @@ class Registration(Structure):
     _fields_ = (
         ("found", c_bool),
         ("trusted", c_bool),
+        ("doubts", c_uint32),
         ("T_target_source", Transform),
         ("covariance", c_double * 36),
         ("center", c_double * 3),
@@ -112,6 +113,12 @@ class Registration(Structure):
         ("matches", c_size_t),
         ("inliers", c_size_t),
         ("overlap", c_double),
+        ("explained", c_double),
+        ("free_space", c_double),
+        ("scale", c_double),
+        ("scale_standard_error", c_double),
+        ("alternative_count", c_size_t),
+        ("alternatives", Transform * 8),
         ("rms", c_double),
         ("radius", c_double),
     )

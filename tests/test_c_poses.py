@@ -15,6 +15,9 @@ SEED = 47
 ABOVE = np.array([0.2, 0.1, 4.0])
 CANCELLED = 5
 
+JUDGED = ("explained", "free_space", "scale", "scale_standard_error")
+"""What the tests of a transform tell."""
+
 
 @pytest.fixture(scope="module")
 def scans() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -65,8 +68,12 @@ def check(found: Registration, expected: surfsig.Registration) -> None:
     for ours, theirs in zip(found.free_directions, expected.free_directions, strict=False):
         np.testing.assert_array_equal(ours.axis[:], theirs.axis)
         np.testing.assert_array_equal(ours.point[:], theirs.point)
-    for name in ("matches", "inliers", "overlap", "rms", "radius", "trusted"):
+    for name in (*["matches", "inliers", "overlap", "rms", "radius", "trusted"], *JUDGED):
         np.testing.assert_equal(getattr(found, name), getattr(expected, name))
+    assert bin(found.doubts).count("1") == len(expected.reasons)
+    assert found.alternative_count == len(expected.alternatives)
+    for ours, theirs in zip(found.alternatives, expected.alternatives, strict=False):
+        np.testing.assert_array_equal(ours.array(), theirs.T_target_source)
 
 
 def test_registrations_are_those_of_python(

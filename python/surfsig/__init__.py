@@ -53,7 +53,14 @@ from surfsig.missing_returns import remove_missing_returns
 from surfsig.odometry import Odometry, ScanStatus, estimate_odometry
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import EqualSurfaces, Piece, Recurrence, Recurrences, find_recurrences
-from surfsig.registration import Registration, register
+from surfsig.registration import (
+    Alternative,
+    MultiwayRegistration,
+    RegisteredPair,
+    Registration,
+    register,
+    register_multiway,
+)
 from surfsig.shapes import (
     SurfaceAngle,
     SurfaceDistance,
@@ -89,6 +96,7 @@ from surfsig.units import unit_mismatch
 
 __all__ = [
     "INSTRUCTION_SET",
+    "Alternative",
     "Chunks",
     "CoordinateSystem",
     "EqualSurfaces",
@@ -107,6 +115,7 @@ __all__ = [
     "InvalidInputError",
     "Library",
     "LibraryEntry",
+    "MultiwayRegistration",
     "Odometry",
     "OdometrySettings",
     "Piece",
@@ -118,6 +127,7 @@ __all__ = [
     "Recurrence",
     "RecurrenceSettings",
     "Recurrences",
+    "RegisteredPair",
     "Registration",
     "RegistrationSettings",
     "ScanSequence",
@@ -162,6 +172,7 @@ __all__ = [
     "read",
     "read_trajectory",
     "register",
+    "register_multiway",
     "remove_missing_returns",
     "remove_outliers",
     "similarity",

@@ -147,6 +147,25 @@ class RegistrationSettings:
         surface_max_deviations: float | None = None,
         surface_max_iterations: int | None = None,
         max_points: int | None = None,
+        rival_proposals: int | None = None,
+        rival_least_score: float | None = None,
+        rival_distance: float | None = None,
+        rival_push: float | None = None,
+        rival_weak: float | None = None,
+        rival_deficit: float | None = None,
+        rival_deviations: float | None = None,
+        free_space_pixel: float | None = None,
+        free_space_margin: float | None = None,
+        free_space_relative_margin: float | None = None,
+        doubted_free_space: float | None = None,
+        free_space_excess: float | None = None,
+        certain_free_space: float | None = None,
+        certain_inliers: int | None = None,
+        certain_explained: float | None = None,
+        doubted_agreement: float | None = None,
+        mirrored_inliers: float | None = None,
+        doubted_scale: float | None = None,
+        scale_deviations: float | None = None,
         trusted_inliers: int | None = None,
         trusted_overlap: float | None = None,
         trusted_overlap_of_start: float | None = None,
@@ -196,6 +215,63 @@ class RegistrationSettings:
     @property
     def max_points(self) -> int:
         """Points of the source in the last fit, at most."""
+    @property
+    def rival_proposals(self) -> int:
+        """Proposed transforms that are tried beside the best one, at most."""
+    @property
+    def rival_least_score(self) -> float:
+        """The score of a proposal over the best one's, at least."""
+    @property
+    def rival_distance(self) -> float:
+        """Radii of a patch by which a rival moves points elsewhere, at least."""
+    @property
+    def rival_push(self) -> float:
+        """Radii of a patch by which the source is pushed along motions that are weakly held."""
+    @property
+    def rival_weak(self) -> float:
+        """Distances from the surface over the points' paths, below which a motion is weakly held."""
+    @property
+    def rival_deficit(self) -> float:
+        """What a rival explains less, as a share, at least, to be refuted."""
+    @property
+    def rival_deviations(self) -> float:
+        """The same in its standard errors."""
+    @property
+    def free_space_pixel(self) -> float:
+        """Radians of a pixel of the range images that tell free space."""
+    @property
+    def free_space_margin(self) -> float:
+        """Voxels before what was measured within which a point is on it."""
+    @property
+    def free_space_relative_margin(self) -> float:
+        """The same as a share of the range."""
+    @property
+    def doubted_free_space(self) -> float:
+        """Share of points in free space from which on a transform is doubted."""
+    @property
+    def free_space_excess(self) -> float:
+        """By how much the shares of two transforms must differ for the smaller one to win."""
+    @property
+    def certain_free_space(self) -> float:
+        """Share of points in free space up to which few matches are enough."""
+    @property
+    def certain_inliers(self) -> int:
+        """Matches that agree, from which on a transform is trusted that leaves nothing in free space."""
+    @property
+    def certain_explained(self) -> float:
+        """Share that such a transform explains, at least."""
+    @property
+    def doubted_agreement(self) -> float:
+        """Matches that agree, per match and overlap, below which the source's mirror image is tried."""
+    @property
+    def mirrored_inliers(self) -> float:
+        """How many times as many matches of the mirror image must agree."""
+    @property
+    def doubted_scale(self) -> float:
+        """Logarithm of a scale from which on it is doubted."""
+    @property
+    def scale_deviations(self) -> float:
+        """The same in its standard errors."""
     @property
     def trusted_inliers(self) -> int:
         """Matches that agree, from which on a transform is trusted."""

@@ -67,6 +67,10 @@ private:
 struct Registration : surfsig_registration {
   /** Takes the source's points to the target; throws where nothing was found. */
   Isometry transform() const { return Isometry(T_target_source); }
+  /** Other transforms that explain as much. */
+  std::vector<Isometry> other_transforms() const {
+    return std::vector<Isometry>(alternatives, alternatives + alternative_count);
+  }
 };
 
 namespace detail {

@@ -7,7 +7,7 @@ use crate::options::thread_count;
 use crate::progress::{Progress, surfsig_progress};
 use crate::transform::surfsig_transform;
 use std::ffi::c_void;
-use surfsig::{FreeDirection, REGISTRATION_STEPS, Registration, RegistrationSettings, Scan, register};
+use surfsig::{Doubt, FreeDirection, REGISTRATION_STEPS, Registration, RegistrationSettings, Scan, register};
 
 /// A scan: its points, and what is known of where they were seen from.
 #[repr(C)]
@@ -99,6 +99,39 @@ impl surfsig_free_direction {
 /// Most directions in which a transform can be free.
 pub const SURFSIG_FREE_DIRECTIONS: usize = 6;
 
+/// Most alternatives that are given.
+pub const SURFSIG_ALTERNATIVES: usize = 8;
+
+/// A doubt: nothing was found.
+pub const SURFSIG_DOUBT_NOT_FOUND: u32 = 1;
+/// A doubt: few matches agree.
+pub const SURFSIG_DOUBT_FEW_MATCHES: u32 = 2;
+/// A doubt: little of the source lies on the target.
+pub const SURFSIG_DOUBT_LITTLE_OVERLAP: u32 = 4;
+/// A doubt: the overlap does not determine all motions.
+pub const SURFSIG_DOUBT_FREE_DIRECTIONS: u32 = 8;
+/// A doubt: points of one scan lie where the other's sensor looked through.
+pub const SURFSIG_DOUBT_FREE_SPACE: u32 = 16;
+/// A doubt: other transforms explain as much.
+pub const SURFSIG_DOUBT_AMBIGUOUS: u32 = 32;
+/// A doubt: the source is larger or smaller than the target.
+pub const SURFSIG_DOUBT_SCALE: u32 = 64;
+/// A doubt: the source's mirror image fits better.
+pub const SURFSIG_DOUBT_MIRRORED: u32 = 128;
+
+fn flag(doubt: &Doubt) -> u32 {
+    match doubt {
+        Doubt::NotFound => SURFSIG_DOUBT_NOT_FOUND,
+        Doubt::FewMatches { .. } => SURFSIG_DOUBT_FEW_MATCHES,
+        Doubt::LittleOverlap { .. } => SURFSIG_DOUBT_LITTLE_OVERLAP,
+        Doubt::FreeDirections { .. } => SURFSIG_DOUBT_FREE_DIRECTIONS,
+        Doubt::FreeSpace { .. } => SURFSIG_DOUBT_FREE_SPACE,
+        Doubt::Ambiguous { .. } => SURFSIG_DOUBT_AMBIGUOUS,
+        Doubt::Scale { .. } => SURFSIG_DOUBT_SCALE,
+        Doubt::Mirrored { .. } => SURFSIG_DOUBT_MIRRORED,
+    }
+}
+
 /// How a source lies in a target, and how sure that is.
 #[allow(non_snake_case, reason = "the name says from where to where")]
 #[repr(C)]
@@ -106,8 +139,10 @@ pub const SURFSIG_FREE_DIRECTIONS: usize = 6;
 pub struct surfsig_registration {
     /// Whether a transform was found; otherwise it and its covariance are NaN.
     pub found: bool,
-    /// Whether the transform is right, by what was seen; false where a direction is free.
+    /// Whether the transform is right, by what was seen: no test has refuted it.
     pub trusted: bool,
+    /// Why it is not trusted: the sum of the SURFSIG_DOUBT_... that hold; 0 where it is.
+    pub doubts: u32,
     /// Takes the source's points to the target.
     pub T_target_source: surfsig_transform,
     /// Of the small twist (rotation vector in radians, then translation) in the target's axes, about the center, that
@@ -125,6 +160,19 @@ pub struct surfsig_registration {
     pub inliers: usize,
     /// Share of the source's surface that lies on the target's, 0 to 1.
     pub overlap: f64,
+    /// The same, where points count the more the nearer they are.
+    pub explained: f64,
+    /// The larger share of one scan's points that lie where the other's sensor looked through; NaN where no viewpoint
+    /// is known from which all was seen.
+    pub free_space: f64,
+    /// How many times as large as the target the source is; NaN where the overlap does not determine it.
+    pub scale: f64,
+    /// Its standard error.
+    pub scale_standard_error: f64,
+    /// Number of alternatives.
+    pub alternative_count: usize,
+    /// Other transforms that explain as much; NaN beyond the last.
+    pub alternatives: [surfsig_transform; SURFSIG_ALTERNATIVES],
     /// Root mean square of the distances there, in the scans' unit.
     pub rms: f64,
     /// Of the patches that were matched, in the scans' unit.
@@ -135,9 +183,14 @@ impl surfsig_registration {
     fn of(found: &Registration) -> Self {
         let mut covariance = [f64::NAN; 36];
         covariance.copy_from_slice(found.covariance.as_flattened());
+        let mut alternatives = [surfsig_transform::or_nan(None); SURFSIG_ALTERNATIVES];
+        for (place, one) in alternatives.iter_mut().zip(&found.alternatives) {
+            *place = surfsig_transform::or_nan(Some(&one.T_target_source));
+        }
         Self {
             found: found.T_target_source.is_some(),
             trusted: found.trusted,
+            doubts: found.doubts.iter().map(flag).sum(),
             T_target_source: surfsig_transform::or_nan(found.T_target_source.as_ref()),
             covariance,
             center: found.center,
@@ -146,6 +199,12 @@ impl surfsig_registration {
             matches: found.matches,
             inliers: found.inliers,
             overlap: found.overlap,
+            explained: found.explained,
+            free_space: found.free_space,
+            scale: found.scale,
+            scale_standard_error: found.scale_standard_error,
+            alternative_count: found.alternatives.len().min(SURFSIG_ALTERNATIVES),
+            alternatives,
             rms: found.rms,
             radius: found.radius,
         }

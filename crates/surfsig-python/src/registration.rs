@@ -7,7 +7,7 @@ use crate::{invalid_input, rows};
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use surfsig::{FreeDirection, Monitor, REGISTRATION_STEPS, RigidTransform, Scan};
+use surfsig::{Alternative, FreeDirection, Monitor, REGISTRATION_STEPS, RigidTransform, Scan};
 
 /// Points (n, 3), their origin, where the sensor stood, and in place of that vectors (n, 3) to its side.
 #[derive(FromPyObject)]
@@ -57,6 +57,44 @@ settings_class! {
         surface_max_iterations: usize = point_to_surface.max_iterations,
         /// Points of the source in the last fit, at most.
         max_points: usize = max_points,
+        /// Proposed transforms that are tried beside the best one, at most.
+        rival_proposals: usize = rivals.proposals,
+        /// The score of a proposal over the best one's, at least.
+        rival_least_score: f64 = rivals.least_score,
+        /// Radii of a patch by which a rival moves points elsewhere, at least.
+        rival_distance: f64 = rivals.distance,
+        /// Radii of a patch by which the source is pushed along motions that are weakly held.
+        rival_push: f64 = rivals.push,
+        /// Distances from the surface over the points' paths, below which a motion is weakly held.
+        rival_weak: f64 = rivals.weak,
+        /// What a rival explains less, as a share, at least, to be refuted.
+        rival_deficit: f64 = rivals.deficit,
+        /// The same in its standard errors.
+        rival_deviations: f64 = rivals.deviations,
+        /// Radians of a pixel of the range images that tell free space.
+        free_space_pixel: f64 = free_space.pixel,
+        /// Voxels before what was measured within which a point is on it.
+        free_space_margin: f64 = free_space.margin,
+        /// The same as a share of the range.
+        free_space_relative_margin: f64 = free_space.relative_margin,
+        /// Share of points in free space from which on a transform is doubted.
+        doubted_free_space: f64 = free_space.doubted_share,
+        /// By how much the shares of two transforms must differ for the smaller one to win.
+        free_space_excess: f64 = free_space.excess,
+        /// Share of points in free space up to which few matches are enough.
+        certain_free_space: f64 = free_space.certain_share,
+        /// Matches that agree, from which on a transform is trusted that leaves nothing in free space.
+        certain_inliers: usize = certain_inliers,
+        /// Share that such a transform explains, at least.
+        certain_explained: f64 = certain_explained,
+        /// Matches that agree, per match and overlap, below which the source's mirror image is tried.
+        doubted_agreement: f64 = doubted_agreement,
+        /// How many times as many matches of the mirror image must agree.
+        mirrored_inliers: f64 = mirrored_inliers,
+        /// Logarithm of a scale from which on it is doubted.
+        doubted_scale: f64 = doubted_scale,
+        /// The same in its standard errors.
+        scale_deviations: f64 = scale_deviations,
         /// Matches that agree, from which on a transform is trusted.
         trusted_inliers: usize = trusted_inliers,
         /// Overlap from which on it is.
@@ -105,6 +143,15 @@ pub fn register<'py>(
     result.set_item("rms", found.rms)?;
     result.set_item("radius", found.radius)?;
     result.set_item("trusted", found.trusted)?;
+    let reasons: Vec<String> = found.doubts.iter().map(ToString::to_string).collect();
+    result.set_item("reasons", reasons)?;
+    let alternative = |one: &Alternative| (one.T_target_source.to_matrix(), one.explained, one.free_space);
+    let alternatives: Vec<_> = found.alternatives.iter().map(alternative).collect();
+    result.set_item("alternatives", alternatives)?;
+    result.set_item("explained", found.explained)?;
+    result.set_item("free_space", found.free_space)?;
+    result.set_item("scale", found.scale)?;
+    result.set_item("scale_standard_error", found.scale_standard_error)?;
     Ok(result)
 }
 

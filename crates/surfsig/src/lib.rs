@@ -72,8 +72,8 @@ mod visibility;
 mod voxels;
 
 pub use alignment::{
-    ConsensusSettings, FreeDirection, GicpCloud, GicpResult, GicpSettings, PointToSurfaceSettings,
-    free_directions, gicp,
+    Alternative, ConsensusSettings, FreeDirection, GicpCloud, GicpResult, GicpSettings,
+    PointToSurfaceSettings, RivalSettings, free_directions, gicp,
 };
 pub use cell_index::CellIndex;
 pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
@@ -112,7 +112,9 @@ pub use recurrences::{
     OrientedScan, PieceAlignment, PieceSituation, PieceView, PosesOfPair, RecurrenceSettings, align_pieces,
     judge_poses, refine_poses,
 };
-pub use registration::{REGISTRATION_STEPS, Registration, RegistrationSettings, register};
+pub use registration::{
+    Doubt, FreeSpaceSettings, REGISTRATION_STEPS, Registration, RegistrationSettings, register,
+};
 pub use resolution::{COARSEST_STEP, RESOLUTION_SAMPLES, Resolution};
 pub use scan::Scan;
 pub use simd::InstructionSet;

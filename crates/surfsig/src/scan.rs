@@ -122,6 +122,22 @@ impl CenteredScan {
         }
     }
 
+    /// The same scan with the sign of x changed: its axes are left-handed then.
+    pub fn mirrored(&self) -> Self {
+        let mirror = |[x, y, z]: [f64; 3]| [-x, y, z];
+        let mirror_direction = |[x, y, z]: [f32; 3]| [-x, y, z];
+        Self {
+            points: self.points.iter().map(|&point| mirror(point)).collect(),
+            numbers: self.numbers.clone(),
+            center: mirror(self.center),
+            viewpoint: self.viewpoint.map(mirror),
+            directions: self
+                .directions
+                .as_ref()
+                .map(|all| all.iter().map(|&direction| mirror_direction(direction)).collect()),
+        }
+    }
+
     /// Those of the points that are wanted.
     pub fn some(&self, is_wanted: impl Fn(&[f64; 3]) -> bool) -> Self {
         let chosen: Vec<usize> = (0..self.points.len()).filter(|&i| is_wanted(&self.points[i])).collect();

@@ -1,6 +1,14 @@
-"""How a scan lies in another: `register`."""
+"""How a scan lies in another: `register`; and many in one: `register_multiway`."""
 
-from surfsig.registration.registration import Registration
+from surfsig.registration.multiway import MultiwayRegistration, RegisteredPair, register_multiway
+from surfsig.registration.registration import Alternative, Registration
 from surfsig.registration.search import register
 
-__all__ = ["Registration", "register"]
+__all__ = [
+    "Alternative",
+    "MultiwayRegistration",
+    "RegisteredPair",
+    "Registration",
+    "register",
+    "register_multiway",
+]

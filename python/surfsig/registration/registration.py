@@ -19,6 +19,19 @@ Array = NDArray[np.float64]
 _BLUE, _ORANGE = (31, 119, 180), (255, 127, 14)
 
 
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """A transform that explains as much of the source as the best one."""
+
+    T_target_source: Array
+    """(4, 4): a point p of the source is at R p + t of the target."""
+    explained: float
+    """Share of the source that lies on the target's surface, near points counting more, 0 to 1."""
+    free_space: float
+    """The larger share of one scan's points in the free space of the other's sensor; NaN where no viewpoint
+    is known."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Registration:
     """How a source lies in a target, and how sure that is.
@@ -47,8 +60,22 @@ class Registration:
     radius: float
     """Of the patches that were matched; with a start, of the same size."""
     trusted: bool
-    """Whether the pose is right, by what was seen: of 100 wrong ones at most 5 are trusted, of 100 right ones
-    at least 95. False where a direction is free, as any pose along it is as good."""
+    """Whether the pose is right, by what was seen: it was tried to be refuted, and was not. False where a
+    direction is free, as any pose along it is as good."""
+    reasons: list[str]
+    """Why it is not trusted, in words; empty where it is."""
+    alternatives: list[Alternative]
+    """Other transforms that explain as much, as of a box that looks the same after half a turn."""
+    explained: float
+    """Share of the source that lies on the target's surface, near points counting more, 0 to 1."""
+    free_space: float
+    """The larger share of one scan's points that lie where the other's sensor looked through, of those that
+    it would have measured; NaN where no viewpoint is known from which all was seen."""
+    scale: float
+    """How many times as large as the target the source is, by a similarity transform fitted to the surface;
+    NaN where the overlap does not determine it. The pose itself is rigid."""
+    scale_standard_error: float
+    """Of `scale`."""
 
     def __repr__(self) -> str:
         """Say what was found."""
@@ -120,7 +147,19 @@ class Registration:
         if self.matches:
             rows.append(("matches", f"{self.inliers:,} of {self.matches:,} agree"))
         rows += [("free", str(direction)) for direction in self.free_directions]
-        return [*rows, ("trusted", "yes" if self.trusted else "no")]
+        rows += [
+            (
+                "as good" if not number else "",
+                "  ".join(f"{value:.6f}" for value in other.T_target_source[line]),
+            )
+            for number, other in enumerate(self.alternatives)
+            for line in range(3)
+        ]
+        rows.append(("trusted", "yes" if self.trusted else "no"))
+        return [
+            *rows,
+            *(("because" if not number else "", reason) for number, reason in enumerate(self.reasons)),
+        ]
 
     def write_report(
         self, path: str | Path, source: PointCloud, target: PointCloud, *, title: str = "Registration"
@@ -171,7 +210,24 @@ class Registration:
             "matches": self.matches,
             "inliers": self.inliers,
             "overlap": self.overlap,
-            "rms": self.rms if np.isfinite(self.rms) else None,
+            "rms": _known(self.rms),
             "radius": self.radius,
             "trusted": self.trusted,
+            "reasons": self.reasons,
+            "alternatives": [
+                {
+                    "T_target_source": other.T_target_source.tolist(),
+                    "explained": other.explained,
+                    "free_space": _known(other.free_space),
+                }
+                for other in self.alternatives
+            ],
+            "explained": self.explained,
+            "free_space": _known(self.free_space),
+            "scale": _known(self.scale),
+            "scale_standard_error": _known(self.scale_standard_error),
         }
+
+
+def _known(value: float) -> float | None:
+    return value if np.isfinite(value) else None

@@ -16,7 +16,7 @@ from surfsig.geometry import pose_array
 from surfsig.missing_returns import without_missing_returns
 from surfsig.orientation import orientation
 from surfsig.point_cloud import PointCloud
-from surfsig.registration.registration import Registration
+from surfsig.registration.registration import Alternative, Registration
 from surfsig.resolution import warn_if_too_coarse
 from surfsig.units import unit_mismatch
 
@@ -93,9 +93,14 @@ def register(
     )
     transform = found.pop("T_target_source")
     directions = [free_direction(*direction) for direction in found.pop("free_directions")]
+    alternatives = [
+        Alternative(np.array(matrix), explained, free_space)
+        for matrix, explained, free_space in found.pop("alternatives")
+    ]
     result = Registration(
         T_target_source=np.full((4, 4), np.nan) if transform is None else np.array(transform),
         free_directions=directions,
+        alternatives=alternatives,
         **found,
     )
     for cloud, name in zip(clouds, ("source", "target"), strict=True):

@@ -1,8 +1,10 @@
-"""A simulated laser triangulation scanner, to test pipelines on scans whose truth is known.
+"""Simulated scenes and sensors, to test pipelines on scans whose truth is known.
 
 A :class:`Scene` is made of analytic surfaces, each placed by a rigid pose; a :class:`Scanner` sweeps a laser
 sheet over it and measures what the laser lights *and* the camera sees, with noise, rounding and outliers.
-Metres throughout; heights grow along negative z (:mod:`surfsig.simulate.scanner` draws the axes).
+A :class:`Lidar` or a :class:`DepthCamera` looks around from one place of a room, a corridor, a hall, a forest
+(:func:`scan`; :mod:`surfsig.simulate.places`). Metres throughout; a :class:`Scanner`'s heights grow along
+negative z (:mod:`surfsig.simulate.scanner` draws the axes).
 
 >>> from surfsig import simulate
 >>> ball = simulate.Placed(simulate.Sphere(0.02), simulate.pose((0, 0, -0.02)), "ball")
@@ -16,9 +18,11 @@ from .acquisitions import RANDOM_TILT, Acquisition, Jitter, paper_acquisition, p
 from .ellipsoid import Ellipsoid
 from .height_field import HeightField
 from .machined_part import PART_SCANNER, part, part_scene
+from .places import block, corridor, forest, hall, pipes, plane, room, tunnel, upright_pose
 from .poses import UP, facing, pose, turn
 from .scanner import Scanner
 from .scene import Hits, Placed, Scene
+from .sensors import DepthCamera, Lidar, distorted, scan
 from .surfaces import Box, Cone, Cylinder, Plane, Rectangle, Sphere, Surface
 
 __all__ = [
@@ -29,10 +33,12 @@ __all__ = [
     "Box",
     "Cone",
     "Cylinder",
+    "DepthCamera",
     "Ellipsoid",
     "HeightField",
     "Hits",
     "Jitter",
+    "Lidar",
     "Placed",
     "Plane",
     "Rectangle",
@@ -40,13 +46,24 @@ __all__ = [
     "Scene",
     "Sphere",
     "Surface",
+    "block",
+    "corridor",
+    "distorted",
     "facing",
+    "forest",
+    "hall",
     "inverse",
     "paper_acquisition",
     "paper_acquisitions",
     "part",
     "part_scene",
+    "pipes",
+    "plane",
     "pose",
+    "room",
+    "scan",
     "transform_points",
+    "tunnel",
     "turn",
+    "upright_pose",
 ]

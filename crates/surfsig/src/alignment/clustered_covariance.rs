@@ -13,6 +13,17 @@ const UNOBSERVABLE: f64 = 1e-12;
 
 /// The number of the block of each point, from 0; `None` where blocks are too few.
 pub(crate) fn blocks(points: &[[f64; 3]]) -> Option<Vec<u32>> {
+    let found = block_numbers(points);
+    (block_count(&found) > FEWEST).then_some(found)
+}
+
+/// How many blocks there are.
+pub(crate) fn block_count(numbers: &[u32]) -> usize {
+    numbers.iter().max().map_or(0, |&last| last as usize + 1)
+}
+
+/// The number of the block of each point, from 0.
+pub(crate) fn block_numbers(points: &[[f64; 3]]) -> Vec<u32> {
     let fold = |of: fn(f64, f64) -> f64, start: f64| {
         points.iter().fold([start; 3], |bound, point| [0, 1, 2].map(|k| of(bound[k], point[k])))
     };
@@ -25,8 +36,7 @@ pub(crate) fn blocks(points: &[[f64; 3]]) -> Option<Vec<u32>> {
         let block = [0, 1, 2].map(|k| ((point[k] - low[k]) / edge).min(BLOCKS - 1.0) as u8);
         *numbers.entry(block).or_insert(next)
     };
-    let found: Vec<u32> = points.iter().map(number).collect();
-    (numbers.len() > FEWEST).then_some(found)
+    points.iter().map(number).collect()
 }
 
 /// The covariance of a least-squares solution of which only sums over whole blocks are independent.
@@ -34,7 +44,7 @@ pub(crate) fn blocks(points: &[[f64; 3]]) -> Option<Vec<u32>> {
 /// `design` says how each residual changes with the six unknowns. The sandwich of Liang and Zeger (Longitudinal data
 /// analysis using generalized linear models, 1986), times blocks over blocks less unknowns.
 pub(crate) fn clustered_covariance(design: &[[f64; 6]], residuals: &[f64], block: &[u32]) -> Matrix6<f64> {
-    let count = block.iter().max().map_or(0, |&last| last as usize + 1);
+    let count = block_count(block);
     let mut gradients = vec![Vector6::zeros(); count];
     let mut information = Matrix6::zeros();
     for ((row, residual), &block) in design.iter().zip(residuals).zip(block) {

@@ -107,18 +107,45 @@ impl Correspondences {
         if cosine > self.settings.min_cosine { closeness.max(0.0) } else { 0.0 }
     }
 
-    /// The proposed transform that most matches agree with, close ones counting more, fitted again to those that agree.
+    /// The proposed transforms that most matches agree with, close ones counting more, the best first; each is fitted
+    /// again to the matches that agree.
     ///
-    /// The identity where there is no match.
-    pub fn agreed_transform(&self) -> RigidTransform {
+    /// At least the best one is given, and up to `rivals` more of at least `least_share` of its score; they carry the
+    /// source's places `distance` apart in the root mean square. The identity where there is no match.
+    pub fn agreed_transforms(&self, rivals: usize, least_share: f64, distance: f64) -> Vec<RigidTransform> {
         let score = |proposal: &RigidTransform| -> f64 {
             self.pairs.iter().map(|pair| self.closeness(pair, proposal)).sum()
         };
         let tried = &self.proposals[..self.proposals.len().min(self.settings.proposals)];
         let scores: Vec<f64> = tried.par_iter().with_min_len(8).map(score).collect();
-        let best =
-            (0..tried.len()).reduce(|best, other| if scores[other] > scores[best] { other } else { best });
-        best.map_or_else(RigidTransform::identity, |best| self.refitted(tried[best]))
+        let mut order: Vec<usize> = (0..tried.len()).collect();
+        // A stable sort: of equal scores the more similar match comes first.
+        order.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]));
+        let mut chosen: Vec<RigidTransform> = Vec::new();
+        for &number in &order {
+            let is_weak = scores[number] < least_share * scores[order[0]];
+            if chosen.len() > rivals || (!chosen.is_empty() && is_weak) {
+                break;
+            }
+            let is_distinct = |other: &RigidTransform| self.displacement(&tried[number], other) > distance;
+            if chosen.iter().all(is_distinct) {
+                chosen.push(self.refitted(tried[number]));
+            }
+        }
+        if chosen.is_empty() { vec![RigidTransform::identity()] } else { chosen }
+    }
+
+    /// The one that most matches agree with.
+    pub fn agreed_transform(&self) -> RigidTransform {
+        self.agreed_transforms(0, 1.0, 0.0).swap_remove(0)
+    }
+
+    /// The root mean square of the distances between the source's places after either transform.
+    fn displacement(&self, one: &RigidTransform, other: &RigidTransform) -> f64 {
+        let rotation = one.rotation - other.rotation;
+        let translation = one.translation - other.translation;
+        let square = |pair: &Pair| (rotation * pair.source + translation).norm_squared();
+        (self.pairs.iter().map(square).sum::<f64>() / self.pairs.len().max(1) as f64).sqrt()
     }
 
     fn refitted(&self, mut transform: RigidTransform) -> RigidTransform {
@@ -189,6 +216,20 @@ mod tests {
     }
 
     #[test]
+    fn a_rival_is_another_transform_that_many_agree_with() {
+        let truth = RigidTransform::from_rotation_vector([0.5, 0.2, -1.0], [3.0, 1.0, -2.0]);
+        let other = RigidTransform::from_rotation_vector([0.0, 0.0, 2.0], [-4.0, 0.0, 1.0]);
+        let both = scene(90, 3, &truth).joined(scene(80, 4, &other));
+        let found = both.agreed_transforms(5, 0.5, 1.0);
+        assert_eq!(found.len(), 2);
+        for (found, truth) in found.iter().zip([truth, other]) {
+            assert!((truth.inverse() * *found).log().iter().all(|c| c.abs() < 1e-6));
+        }
+        assert_eq!(both.agreed_transforms(0, 0.5, 1.0), found[..1]);
+        assert_eq!(both.agreed_transforms(5, 0.8, 1.0), found[..1], "20 matches are few beside 30");
+    }
+
+    #[test]
     fn joined_matches_come_in_the_order_of_similarity() {
         let truth = RigidTransform::identity();
         let joined = scene(20, 2, &truth).joined(scene(11, 2, &truth));
@@ -198,6 +239,9 @@ mod tests {
 
     #[test]
     fn without_matches_nothing_is_moved() {
-        assert_eq!(scene(0, 1, &RigidTransform::identity()).agreed_transform(), RigidTransform::identity());
+        assert_eq!(
+            scene(0, 1, &RigidTransform::identity()).agreed_transforms(3, 0.3, 1.0),
+            [RigidTransform::identity()]
+        );
     }
 }

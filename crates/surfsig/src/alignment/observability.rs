@@ -8,7 +8,7 @@ use nalgebra::{SMatrix, SVD, Vector3, Vector6};
 
 /// Largest root mean square of the residuals that an unobservable motion makes, over that of its points' paths: what
 /// noise and small features leave of a cylinder or a plane in scans.
-const UNOBSERVABLE: f64 = 0.04;
+pub(crate) const UNOBSERVABLE: f64 = 0.04;
 /// Part of a motion that is a rotation below which it is a translation.
 const ROTATIONAL: f64 = 0.3;
 
@@ -70,19 +70,49 @@ impl FreeDirection {
 /// assert!(matches!(found[0], FreeDirection::Rotation { axis: [_, _, z], .. } if z.abs() > 0.999));
 /// ```
 pub fn free_directions(points: &[[f64; 3]], normals: &[[f64; 3]]) -> Vec<FreeDirection> {
-    if points.is_empty() {
-        return Vec::new();
+    let motions = Motions::new(points, normals);
+    motions.named(|sliding, _| sliding <= UNOBSERVABLE)
+}
+
+/// Six motions of a surface, those along which it slides most first.
+pub(crate) struct Motions {
+    pub center: Vector3<f64>,
+    /// Rotations in units of this length move points as far as translations do.
+    pub unit: f64,
+    /// The root mean square of the distances from the surface that a motion makes, over that of its points' paths; and
+    /// the unit twist about `center`, rotations in units of `unit`.
+    pub all: Vec<(f64, Vector6<f64>)>,
+}
+
+impl Motions {
+    /// Of points with unit normals.
+    pub fn new(points: &[[f64; 3]], normals: &[[f64; 3]]) -> Self {
+        let rows: Vec<_> =
+            points.iter().zip(normals).map(|(p, n)| (Vector3::from(*p), Vector3::from(*n), 0.0)).collect();
+        let LinearisedDistances { center, unit, information, .. } = LinearisedDistances::new(&rows);
+        let mut all = Vec::new();
+        if !points.is_empty() {
+            let eigen = (information / points.len() as f64).symmetric_eigen();
+            let pairs = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
+            all = pairs.map(|(value, vector)| (value.max(0.0).sqrt(), vector.into_owned())).collect();
+            all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        }
+        Self { center, unit, all }
     }
-    let rows: Vec<_> =
-        points.iter().zip(normals).map(|(p, n)| (Vector3::from(*p), Vector3::from(*n), 0.0)).collect();
-    let LinearisedDistances { center, unit, information, .. } = LinearisedDistances::new(&rows);
-    let information = information / points.len() as f64;
-    let eigen = information.symmetric_eigen();
-    let mut numbers: Vec<usize> = (0..6).filter(|&k| eigen.eigenvalues[k] <= UNOBSERVABLE.powi(2)).collect();
-    numbers.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-    let motions: Vec<Vector6<f64>> =
-        numbers.iter().map(|&k| eigen.eigenvectors.column(k).into_owned()).collect();
-    named(&motions, center, unit)
+
+    /// Those that are free, as rotations and translations; of each is known how little it slides, and its number.
+    pub fn named(&self, is_free: impl Fn(f64, usize) -> bool) -> Vec<FreeDirection> {
+        let numbered = self.all.iter().enumerate();
+        let free = numbered.filter(|(number, (sliding, _))| is_free(*sliding, *number));
+        let motions: Vec<Vector6<f64>> = free.map(|(_, (_, motion))| *motion).collect();
+        named(&motions, self.center, self.unit)
+    }
+
+    /// The transform that carries points so far along a motion, in the root mean square.
+    pub fn along(&self, number: usize, length: f64) -> RigidTransform {
+        let [x, y, z, translation @ ..] = <[f64; 6]>::from(self.all[number].1 * length);
+        RigidTransform::about(self.center.into(), [x, y, z].map(|angle| angle / self.unit), translation)
+    }
 }
 
 /// Rotations and translations that span free motions, which are twists about `center` with rotations in units of

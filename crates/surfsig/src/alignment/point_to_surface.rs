@@ -10,10 +10,19 @@ use rayon::prelude::*;
 
 /// Nearest points of the target that its surface is fitted to.
 const NEIGHBORS: usize = 20;
+/// Nearest points that show whether the surface through the first ones goes on around them.
+const SURROUNDING: usize = 60;
+/// Largest sine of the angle between the surface and points around it that it passes through.
+const LARGEST_SLOPE: f64 = 0.5;
+/// Share of the points around that it must pass through.
+const LEAST_SHARE: f64 = 0.5;
 /// Coefficients of the paraboloid.
 const UNKNOWNS: usize = 6;
 /// Of the largest eigenvalue, below which a direction is not determined by the residuals.
 const UNDETERMINED: f64 = 1e-8;
+/// Of a quadratic term's sum of squares, what the terms before it leave over, below which the neighbours do not determine
+/// it and the surface is a plane: points on two scan lines leave 0.01 and less, points that are spread a third.
+const UNDETERMINED_TERM: f64 = 0.05;
 /// Rounding, likewise.
 const ROUNDING: f64 = 1e-12;
 /// Points that a thread works on at a time.
@@ -75,15 +84,18 @@ pub(crate) struct TargetSurface {
     points: Vec<[f64; 3]>,
     tree: KdTree,
     voxel: f64,
+    /// Whether the surface around each point goes on beyond its nearest neighbours. Those may all lie on one scan
+    /// line, which in a corner lies in a plane of its own that is none of the scene's.
+    goes_on: Vec<bool>,
 }
 
 /// How far a point is above the surface, and what the surface there rests on.
-struct Residual {
+pub(super) struct Residual {
     /// Of the source's point.
-    number: usize,
+    pub number: usize,
     /// Along the normal.
-    distance: f64,
-    normal: Vector3<f64>,
+    pub distance: f64,
+    pub normal: Vector3<f64>,
     /// The target's points that tell the distance.
     neighbors: [u32; NEIGHBORS],
     /// What each adds to the distance, per its own error along the normal.
@@ -94,6 +106,7 @@ struct Residual {
 
 /// Source points that lie on the target's surface, after the transform was fitted to them.
 #[allow(non_snake_case)]
+#[derive(Debug, Clone)]
 pub(crate) struct PointToSurface {
     pub T_target_source: RigidTransform,
     /// Of the twist, rotation first, in the target's axes about `center`.
@@ -107,13 +120,22 @@ pub(crate) struct PointToSurface {
     pub overlap: f64,
     /// Of the inliers' distances.
     pub rms: f64,
+    /// The distance up to which a point is an inlier.
+    pub farthest: f64,
 }
 
 impl TargetSurface {
     /// Points spread evenly over the surface, about a voxel apart.
     pub fn new(points: Vec<[f64; 3]>, voxel: f64) -> Self {
         let tree = KdTree::new(&points);
-        Self { points, tree, voxel }
+        let goes_on = |found: &mut Vec<(f64, u32)>, point: &[f64; 3]| {
+            tree.nearest_k(*point, SURROUNDING, found);
+            let around: Vec<Vector3<f64>> =
+                found.iter().map(|&(_, index)| points[index as usize].into()).collect();
+            surface_goes_on(&around)
+        };
+        let goes_on = points.par_iter().with_min_len(PART).map_init(Vec::new, goes_on).collect();
+        Self { points, tree, voxel, goes_on }
     }
 
     /// Of one point; `None` where the target has no surface.
@@ -125,7 +147,9 @@ impl TargetSurface {
         found: &mut Vec<(f64, u32)>,
     ) -> Option<Residual> {
         self.tree.nearest_k(point, NEIGHBORS, found);
-        if found.len() < NEIGHBORS || found[0].0 >= (settings.max_distance * self.voxel).powi(2) {
+        let [(square, nearest), ..] = found[..] else { return None };
+        let is_near = square < (settings.max_distance * self.voxel).powi(2);
+        if found.len() < NEIGHBORS || !is_near || !self.goes_on[nearest as usize] {
             return None;
         }
         let mut neighbors = [0; NEIGHBORS];
@@ -155,11 +179,7 @@ impl TargetSurface {
             [1.0, x, y, 0.5 * x * x, x * y, 0.5 * y * y][column]
         });
         let z = SVector::<f64, NEIGHBORS>::from_fn(|row, _| local[row].z);
-        let normal_matrix = design.tr_mul(&design) + SMatrix::<f64, UNKNOWNS, UNKNOWNS>::identity() * 1e-9;
-        let factored = normal_matrix.cholesky()?;
-        let fit = factored.solve(&design.tr_mul(&z));
-        // What f takes from each neighbour's z.
-        let share = design * factored.solve(&SVector::<f64, UNKNOWNS>::ith(0, 1.0));
+        let (fit, share, unknowns) = paraboloid_or_plane(&design, &z)?;
         let slope = Vector3::new(-fit[1], -fit[2], 1.0);
         let steep = 1.0 / slope.norm();
         // The point is at 0: the surface is f above it, measured along the normal.
@@ -170,12 +190,24 @@ impl TargetSurface {
             normal: axes * slope * steep,
             neighbors,
             weights: std::array::from_fn(|k| -share[k] * steep),
-            variance: rest * (scale * steep).powi(2) / (NEIGHBORS - UNKNOWNS) as f64,
+            variance: rest * (scale * steep).powi(2) / (NEIGHBORS - unknowns) as f64,
         })
     }
 
-    /// Those of inliers: near the surface, where the target is smooth.
-    fn inliers(&self, moved: &[[f64; 3]], settings: &PointToSurfaceSettings) -> Option<Vec<Residual>> {
+    /// How far points are from the surface, along its normal; `None` where there is none.
+    pub fn distances(&self, points: &[[f64; 3]], settings: &PointToSurfaceSettings) -> Vec<Option<f64>> {
+        let distance = |found: &mut Vec<(f64, u32)>, (number, point): (usize, &[f64; 3])| {
+            self.residual(number, *point, settings, found).map(|residual| residual.distance)
+        };
+        points.par_iter().enumerate().with_min_len(PART).map_init(Vec::new, distance).collect()
+    }
+
+    /// Those of inliers: near the surface, where the target is smooth; and how far away they are at most.
+    pub(super) fn inliers(
+        &self,
+        moved: &[[f64; 3]],
+        settings: &PointToSurfaceSettings,
+    ) -> Option<(Vec<Residual>, f64)> {
         let residual = |found: &mut Vec<(f64, u32)>, (number, point): (usize, &[f64; 3])| {
             self.residual(number, *point, settings, found)
         };
@@ -189,7 +221,7 @@ impl TargetSurface {
         // Where the target's own points lie off their surface more than elsewhere, there is an edge.
         let largest = settings.max_variance * median(all.iter().map(|one| one.variance).collect())?;
         let is_inlier = |one: &Residual| one.variance <= largest && one.distance.abs() < farthest;
-        Some(all.into_iter().filter(is_inlier).collect())
+        Some((all.into_iter().filter(is_inlier).collect(), farthest))
     }
 
     /// Fits a transform that is nearly right, and says how sure it is; `None` where hardly a point meets the surface.
@@ -220,19 +252,60 @@ impl TargetSurface {
         let mut transform = start;
         for step in 0.. {
             let moved = transform.transform_points(source);
-            let inliers = self.inliers(&moved, settings)?;
+            let (inliers, farthest) = self.inliers(&moved, settings)?;
             if inliers.len() < settings.min_inliers {
                 return None;
             }
             let system = System::new(&inliers, &moved);
             let (change, length) = system.linearised.step(UNDETERMINED);
             if step == settings.max_iterations || length < settings.epsilon * self.voxel {
-                return Some(system.result(transform, &inliers, source.len()));
+                let result = system.result(transform, &inliers, source.len());
+                return Some(PointToSurface { farthest, ..result });
             }
             transform = change * transform;
         }
         None
     }
+}
+
+/// Whether the plane through the nearest points, which come first, passes through the others, too.
+fn surface_goes_on(points: &[Vector3<f64>]) -> bool {
+    if points.len() <= NEIGHBORS {
+        return true;
+    }
+    let (near, others) = points.split_at(NEIGHBORS);
+    let mean = near.iter().sum::<Vector3<f64>>() / NEIGHBORS as f64;
+    let spread = near.iter().map(|p| (p - mean) * (p - mean).transpose()).sum::<Matrix3<f64>>();
+    let eigen = SymmetricEigen::new(spread);
+    let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+    let is_passed = |p: &&Vector3<f64>| normal.dot(&(*p - mean)).abs() <= LARGEST_SLOPE * (*p - mean).norm();
+    others.iter().filter(is_passed).count() as f64 >= LEAST_SHARE * others.len() as f64
+}
+
+/// The coefficients of eq. (5) by least squares, what the first one takes from each z, and how many are determined.
+///
+/// Where points lie along two lines, a paraboloid may rise between them as it likes: a plane is fitted there.
+fn paraboloid_or_plane(
+    design: &SMatrix<f64, NEIGHBORS, UNKNOWNS>,
+    z: &SVector<f64, NEIGHBORS>,
+) -> Option<(SVector<f64, UNKNOWNS>, SVector<f64, NEIGHBORS>, usize)> {
+    const PLANE: usize = 3;
+    let products = design.tr_mul(design) + SMatrix::<f64, UNKNOWNS, UNKNOWNS>::identity() * 1e-9;
+    let right = design.tr_mul(z);
+    let factored = products.cholesky()?;
+    // The square of a diagonal element is what the terms before leave of its own.
+    let left = factored.l_dirty();
+    if (PLANE..UNKNOWNS).all(|k| left[(k, k)].powi(2) >= UNDETERMINED_TERM * products[(k, k)]) {
+        let share = design * factored.solve(&SVector::<f64, UNKNOWNS>::ith(0, 1.0));
+        return Some((factored.solve(&right), share, UNKNOWNS));
+    }
+    let factored = products.fixed_view::<PLANE, PLANE>(0, 0).into_owned().cholesky()?;
+    let fit = factored.solve(&right.fixed_rows::<PLANE>(0).into_owned());
+    let first = factored.solve(&SVector::<f64, PLANE>::ith(0, 1.0));
+    let share = design.fixed_columns::<PLANE>(0) * first;
+    let mut coefficients = SVector::<f64, UNKNOWNS>::zeros();
+    coefficients.fixed_rows_mut::<PLANE>(0).copy_from(&fit);
+    Some((coefficients, share, PLANE))
 }
 
 /// The inliers' distances, linearised.
@@ -269,6 +342,7 @@ impl System {
             overlap: inliers.len() as f64 / of as f64,
             rms: (square / inliers.len() as f64).sqrt(),
             points: self.points,
+            farthest: f64::INFINITY,
         }
     }
 

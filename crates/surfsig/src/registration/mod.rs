@@ -1,17 +1,24 @@
 //! How a scan lies in another: [`register`].
 //!
 //! Keypoints are matched by their field signatures ([`crate::match_fields`]), the matches agree on a transform
-//! ([`crate::ConsensusSettings`]), generalised ICP refines it ([`crate::gicp`]), and the last steps fit points to the
-//! surface and tell how sure it is.
+//! ([`crate::ConsensusSettings`]), generalised ICP refines it ([`crate::gicp`]), the last steps fit points to the
+//! surface and tell how sure it is, and then it is tried to refute the result ([`Doubt`]).
 
+mod doubt;
+mod free_space;
+mod judgement;
 mod result;
 mod settings;
 
+pub use doubt::Doubt;
 pub use result::Registration;
-pub use settings::RegistrationSettings;
+pub use settings::{FreeSpaceSettings, RegistrationSettings};
+
+use free_space::BothSensors;
+use judgement::{Judge, Judgement};
 
 use crate::alignment::{
-    Correspondences, GicpCloud, GicpSettings, TargetSurface, even_sample, free_directions, gicp,
+    Alternative, Correspondences, GicpCloud, GicpSettings, PointToSurface, TargetSurface, even_sample, gicp,
 };
 use crate::field::{KeypointOptions, keypoints_within, match_fields};
 use crate::geometry::RigidTransform;
@@ -82,10 +89,10 @@ fn registered(
     let patch = Radius::new(radius)?;
     let [from_source, to_target] =
         [source.center, target.center].map(|center| RigidTransform::from_rotation_vector([0.0; 3], center));
-    let (proposed, matches) = match start {
+    let (proposals, matches) = match start {
         Some(start) => {
             monitor.add(2);
-            (to_target.inverse() * *start * from_source, None)
+            (vec![to_target.inverse() * *start * from_source], None)
         }
         None => {
             let thinned =
@@ -94,7 +101,10 @@ fn registered(
             if matches.len() < 3 {
                 return Ok(Registration::nothing(radius, matches.len()));
             }
-            (matches.agreed_transform(), Some(matches))
+            let rivals = settings.rivals;
+            let distance = rivals.distance * radius;
+            let proposals = matches.agreed_transforms(rivals.proposals, rivals.least_score, distance);
+            (proposals, Some(matches))
         }
     };
     let count = matches.as_ref().map_or(0, Correspondences::len);
@@ -108,31 +118,80 @@ fn registered(
     let surface = TargetSurface::new(even_sample(&target.points, theirs.len(), voxel), voxel);
     monitor.add(1);
     monitor.check()?;
-    let refined = refined(ours, theirs, proposed, voxel, settings);
+    let refined = refined(ours, theirs, proposals[0], voxel, settings);
     monitor.add(1);
     monitor.check()?;
     let Some(found) = surface.align(&sample, refined, &settings.point_to_surface) else {
         return Ok(Registration::nothing(radius, count));
     };
-    monitor.add(1);
-    let inliers = matches.as_ref().map_or(0, |matches| matches.inlier_count(&found.T_target_source));
-    let free = free_directions(&found.points, &found.normals);
-    let is_right = match matches {
-        None => found.overlap >= settings.trusted_overlap_of_start,
-        Some(_) => inliers >= settings.trusted_inliers && found.overlap >= settings.trusted_overlap,
+    monitor.check()?;
+    let judge = Judge {
+        surface: &surface,
+        sample: &sample,
+        sensors: BothSensors::new(source, &sample, target, voxel, settings.free_space),
+        radius,
+        settings,
     };
+    let inliers_of =
+        |found: &PointToSurface| matches.as_ref().map(|matches| matches.inlier_count(&found.T_target_source));
+    let (mut found, mut inliers) = (found.clone(), inliers_of(&found));
+    let mut judged = judge.judged(&found, &proposals[1..], inliers);
+    if let Some(better) =
+        judged.better.and_then(|better| surface.align(&sample, better, &settings.point_to_surface))
+    {
+        let others: Vec<RigidTransform> =
+            proposals[1..].iter().copied().chain([found.T_target_source]).collect();
+        inliers = inliers_of(&better);
+        judged = judge.judged(&better, &others, inliers);
+        found = better;
+    }
+    if let (true, Some(own)) = (judged.doubts.is_empty(), inliers) {
+        let agreement = own as f64 / (count as f64 * found.overlap);
+        if agreement < settings.doubted_agreement {
+            let mirrored = mirrored_inliers(source, target, patch, settings, monitor)?;
+            if mirrored as f64 > settings.mirrored_inliers * own as f64 {
+                judged.doubts.push(Doubt::Mirrored { inliers: mirrored });
+            }
+        }
+    }
+    let Judgement { doubts, free_directions, alternatives, .. } = judged;
+    monitor.add(1);
+    let in_scans = |transform: RigidTransform| to_target * transform * from_source.inverse();
+    let alternatives = alternatives
+        .into_iter()
+        .map(|rival: Alternative| Alternative { T_target_source: in_scans(rival.T_target_source), ..rival });
     Ok(Registration {
-        T_target_source: Some(to_target * found.T_target_source * from_source.inverse()),
+        T_target_source: Some(in_scans(found.T_target_source)),
         covariance: found.covariance.into(),
         center: to_target.transform_point(found.center),
-        trusted: is_right && free.is_empty(),
-        free_directions: free.iter().map(|direction| direction.transformed(&to_target)).collect(),
+        trusted: doubts.is_empty(),
+        doubts,
+        free_directions: free_directions.iter().map(|direction| direction.transformed(&to_target)).collect(),
+        alternatives: alternatives.collect(),
         matches: count,
-        inliers,
+        inliers: inliers.unwrap_or(0),
         overlap: found.overlap,
+        explained: judged.explained,
+        free_space: judged.free_space,
+        scale: judged.scale,
+        scale_standard_error: judged.scale_standard_error,
         rms: found.rms,
         radius,
     })
+}
+
+/// How many matches of the source's mirror image agree with one transform.
+fn mirrored_inliers(
+    source: &CenteredScan,
+    target: &CenteredScan,
+    patch: Radius,
+    settings: &RegistrationSettings,
+    monitor: &Monitor,
+) -> Result<usize, Error> {
+    let thinned = |scan: &CenteredScan| scan.thinned(patch.get() / settings.description_voxels_per_radius);
+    let mirrored = thinned(source).mirrored();
+    let matches = matched(&mirrored, &thinned(target), patch, settings, &monitor.apart())?;
+    Ok(matches.inlier_count(&matches.agreed_transform()))
 }
 
 /// Matches keypoints; where it is not known for both scans from where they were seen, both sides of the source's

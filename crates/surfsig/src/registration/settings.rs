@@ -1,6 +1,6 @@
 //! How scans are registered.
 
-use crate::alignment::{ConsensusSettings, PointToSurfaceSettings};
+use crate::alignment::{ConsensusSettings, PointToSurfaceSettings, RivalSettings};
 
 /// What an expert may change; nothing has to be set. `benchmarks/sweep_settings.py` shows what other values give on
 /// simulated scenes.
@@ -44,10 +44,31 @@ pub struct RegistrationSettings {
     pub min_points: usize,
     /// Voxels of each scan without which there are no distributions to refine by.
     pub min_voxels: usize,
+    /// When another transform explains as much.
+    pub rivals: RivalSettings,
+    /// How rivals, and sources of another size, are fitted: from farther away than a transform that was refined, and
+    /// than a push (8 voxels), so that what is pushed off the surface is seen to be off it.
+    pub rival_fit: PointToSurfaceSettings,
+    /// When points lie where a sensor looked through.
+    pub free_space: FreeSpaceSettings,
+    /// The logarithm of a scale from which on it is doubted, if it differs from 0 by so many standard errors: ranges
+    /// of sensors differ by a thousandth.
+    pub doubted_scale: f64,
+    /// These standard errors.
+    pub scale_deviations: f64,
     /// Matches that agree, from which on a transform is trusted: at most 22 agree with one of the 108 pairs of rooms
     /// without overlap (`benchmarks/registration.py`), and at most 28 with one of 30 pairs of periodic terrains; at
     /// least 62 with a right one of redkitchen, bunny and lidar.
     pub trusted_inliers: usize,
+    /// Matches that agree, from which on a transform is trusted that leaves nothing in free space.
+    pub certain_inliers: usize,
+    /// Share that such a transform explains, at least: waves that come again explain a third of the wrong ones.
+    pub certain_explained: f64,
+    /// Matches that agree, per match and overlap, below which it is tried whether the source's mirror image fits better:
+    /// 0.2 to 0.3 of mirrored rooms, 0.33 and more of right ones.
+    pub doubted_agreement: f64,
+    /// How many times as many matches of the mirror image must agree.
+    pub mirrored_inliers: f64,
     /// Overlap from which on it is.
     pub trusted_overlap: f64,
     /// Overlap from which on a transform is trusted that the caller gave roughly.
@@ -74,10 +95,62 @@ impl Default for RegistrationSettings {
             max_points: 6000,
             min_points: 50,
             min_voxels: 16,
+            rivals: RivalSettings::default(),
+            rival_fit: PointToSurfaceSettings {
+                max_distance: 9.0,
+                max_iterations: 10,
+                ..PointToSurfaceSettings::default()
+            },
+            free_space: FreeSpaceSettings::default(),
+            doubted_scale: 0.005,
+            scale_deviations: 4.0,
             trusted_inliers: 32,
+            certain_inliers: 8,
+            certain_explained: 0.5,
+            doubted_agreement: 0.5,
+            mirrored_inliers: 1.25,
             trusted_overlap: 0.04,
             trusted_overlap_of_start: 0.3,
             threads: None,
+        }
+    }
+}
+
+/// When a point lies where a sensor looked through.
+///
+/// ```
+/// assert!(surfsig::FreeSpaceSettings::default().doubted_share < 0.1);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FreeSpaceSettings {
+    /// Width of a pixel of the range image, in radians: wider than the gaps between the rings of a lidar.
+    pub pixel: f64,
+    /// Length before what was measured within which a point is on it, in voxels.
+    pub margin: f64,
+    /// The same as a share of the range.
+    pub relative_margin: f64,
+    /// Points in sight without which nothing is said.
+    pub min_points: usize,
+    /// Share of points in free space from which on a transform is doubted: at most 0.009 of those of right ones of
+    /// simulated lidars and depth cameras, 0.005 of a real lidar; 0.024 and more of wrong ones
+    /// (`benchmarks/trust.py`).
+    pub doubted_share: f64,
+    /// By how much the shares of two transforms must differ for the smaller one to win.
+    pub excess: f64,
+    /// Share up to which few matches are enough.
+    pub certain_share: f64,
+}
+
+impl Default for FreeSpaceSettings {
+    fn default() -> Self {
+        Self {
+            pixel: 3.0_f64.to_radians(),
+            margin: 2.0,
+            relative_margin: 0.02,
+            min_points: 50,
+            doubted_share: 0.02,
+            excess: 0.01,
+            certain_share: 0.005,
         }
     }
 }

@@ -1,0 +1,153 @@
+//! Whether another transform explains as much as the best one: proposed ones, and pushes along motions that little
+//! holds.
+
+use super::explained::{Closeness, Explained, explained_share};
+use super::observability::{FreeDirection, Motions, UNOBSERVABLE};
+use super::point_to_surface::{PointToSurface, PointToSurfaceSettings, TargetSurface};
+use crate::geometry::RigidTransform;
+
+/// When another transform explains as much; lengths are in radii of a patch. `benchmarks/trust.py --setting` shows what
+/// other values do in simulated places.
+///
+/// ```
+/// assert_eq!(surfsig::RivalSettings::default().proposals, 8);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RivalSettings {
+    /// Points of the source that tell transforms apart, at most.
+    pub points: usize,
+    /// Proposed transforms that are tried beside the best one, at most.
+    pub proposals: usize,
+    /// The score of a proposal over the best one's, at least: matches prefer what was seen from the same side, so that
+    /// equal poses of an empty room have a fifth of the best one's.
+    pub least_score: f64,
+    /// Root mean square of the distances by which a rival moves points elsewhere, at least.
+    pub distance: f64,
+    /// How far the source is pushed along motions that are weakly held. With 0.15 the scan lines of a smooth corridor
+    /// pull it back where nothing else holds it (3 of 6 corridors are seen to be free), with 0.6 they do not (6 of 6).
+    pub push: f64,
+    /// The root mean square of the distances from the surface over the points' paths, below which a motion is weakly
+    /// held.
+    pub weak: f64,
+    /// What a rival explains less, as a share of what the best one explains, to be refuted.
+    pub deficit: f64,
+    /// The same in its standard errors.
+    pub deviations: f64,
+}
+
+impl Default for RivalSettings {
+    fn default() -> Self {
+        Self {
+            points: 600,
+            proposals: 8,
+            least_score: 0.1,
+            distance: 1.0,
+            push: 0.5,
+            weak: 0.25,
+            deficit: 0.03,
+            deviations: 3.0,
+        }
+    }
+}
+
+/// A transform that explains as much of the source as the best one.
+///
+/// ```
+/// use surfsig::{Alternative, RigidTransform};
+/// let same = Alternative { T_target_source: RigidTransform::identity(), explained: 0.8, free_space: 0.0 };
+/// assert!(same.explained > same.free_space);
+/// ```
+#[allow(non_snake_case)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alternative {
+    /// Takes the source's points to the target.
+    pub T_target_source: RigidTransform,
+    /// Share of the source that lies on the target's surface, near points counting more, 0 to 1.
+    pub explained: f64,
+    /// The larger share of one scan's points in the free space of the other's sensor; NaN where no viewpoint is known.
+    pub free_space: f64,
+}
+
+/// A surface, a source, and the best transform.
+pub(crate) struct Rivals<'a> {
+    pub surface: &'a TargetSurface,
+    /// Some of the source's points.
+    pub source: &'a [[f64; 3]],
+    pub best: &'a PointToSurface,
+    /// Of the patches.
+    pub radius: f64,
+    pub settings: RivalSettings,
+    /// How transforms that are far off are fitted to the surface.
+    pub fit: PointToSurfaceSettings,
+}
+
+impl Rivals<'_> {
+    /// What the best transform explains.
+    pub fn explained(&self) -> Explained {
+        Explained::new(self.closeness(&self.best.T_target_source), self.source)
+    }
+
+    fn closeness(&self, transform: &RigidTransform) -> Closeness {
+        self.closeness_of(&transform.transform_points(self.source))
+    }
+
+    /// Of points in the target.
+    pub fn closeness_of(&self, moved: &[[f64; 3]]) -> Closeness {
+        self.surface.closeness(moved, self.best.farthest, &self.fit)
+    }
+
+    /// The transform that a start leads to, and the share that it explains, if that is as much as the best one does.
+    fn as_good(&self, explained: &Explained, start: RigidTransform) -> Option<(RigidTransform, f64)> {
+        let found = self.surface.align(self.source, start, &self.fit)?.T_target_source;
+        let closeness = self.closeness(&found);
+        let (deficit, error) = explained.deficit_of(&closeness)?;
+        let is_refuted = deficit > self.settings.deficit && deficit > self.settings.deviations * error;
+        (!is_refuted).then(|| (found, explained_share(&closeness)))
+    }
+
+    /// Those of proposed transforms that explain as much and lead elsewhere.
+    pub fn as_good_as_the_best(
+        &self,
+        explained: &Explained,
+        proposed: &[RigidTransform],
+    ) -> Vec<(RigidTransform, f64)> {
+        let mut found: Vec<(RigidTransform, f64)> = Vec::new();
+        for start in proposed {
+            let Some((transform, share)) = self.as_good(explained, *start) else { continue };
+            let is_elsewhere = |other: &RigidTransform| {
+                self.displacement(&transform, other) > self.settings.distance * self.radius
+            };
+            let others = found.iter().map(|(other, _)| other);
+            if others.chain([&self.best.T_target_source]).all(is_elsewhere) {
+                found.push((transform, share));
+            }
+        }
+        found
+    }
+
+    /// Motions that the overlap does not determine: along some the surface slides over itself, along others it does
+    /// not come back when it is pushed, and explains as much.
+    pub fn free_directions(&self, explained: &Explained) -> Vec<FreeDirection> {
+        let motions = Motions::new(&self.best.points, &self.best.normals);
+        let length = self.settings.push * self.radius;
+        motions.named(|sliding, number| {
+            sliding <= UNOBSERVABLE
+                || sliding <= self.settings.weak
+                    && [length, -length].into_iter().any(|length| {
+                        let start = motions.along(number, length) * self.best.T_target_source;
+                        self.as_good(explained, start).is_some_and(|(transform, _)| {
+                            self.displacement(&transform, &self.best.T_target_source) > 0.5 * length.abs()
+                        })
+                    })
+        })
+    }
+
+    /// The root mean square of the distances between the source's points after either transform.
+    fn displacement(&self, one: &RigidTransform, other: &RigidTransform) -> f64 {
+        let rotation = one.rotation - other.rotation;
+        let translation = one.translation - other.translation;
+        let square =
+            |point: &[f64; 3]| (rotation * nalgebra::Vector3::from(*point) + translation).norm_squared();
+        (self.source.iter().map(square).sum::<f64>() / self.source.len().max(1) as f64).sqrt()
+    }
+}

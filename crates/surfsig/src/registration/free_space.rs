@@ -1,0 +1,87 @@
+//! What both sensors would have seen: points of one scan where the other's sensor looked through.
+
+use super::settings::FreeSpaceSettings;
+use crate::alignment::even_sample;
+use crate::geometry::RigidTransform;
+use crate::scan::CenteredScan;
+use crate::visibility::{RangeImageSettings, SphericalRangeImage, Visibility, all_seen_from};
+
+/// What two sensors saw, as far as is known from where they saw all of their scans, and some points of both.
+pub(super) struct BothSensors<'a> {
+    of_source: Option<SensorView>,
+    of_target: Option<SensorView>,
+    source: &'a [[f64; 3]],
+    target: Vec<[f64; 3]>,
+    settings: FreeSpaceSettings,
+}
+
+impl<'a> BothSensors<'a> {
+    /// Takes both scans, an even sample of the source, and the distance between its points.
+    pub fn new(
+        source: &CenteredScan,
+        sample: &'a [[f64; 3]],
+        target: &CenteredScan,
+        voxel: f64,
+        settings: FreeSpaceSettings,
+    ) -> Self {
+        let of_target = even_sample(&target.points, sample.len(), voxel);
+        Self {
+            of_source: SensorView::new(source, sample, voxel, &settings),
+            of_target: SensorView::new(target, &of_target, voxel, &settings),
+            source: sample,
+            target: of_target,
+            settings,
+        }
+    }
+
+    /// The larger share of points of one scan that lie in the other sensor's free space, of those that it would have
+    /// measured; NaN where neither sensor can tell.
+    #[allow(non_snake_case)]
+    pub fn free_space(&self, T_target_source: &RigidTransform) -> f64 {
+        let share = |view: &Option<SensorView>, points: &[[f64; 3]], to_scan: &RigidTransform| {
+            view.as_ref().map_or(f64::NAN, |view| view.free_space(points, to_scan, self.settings.min_points))
+        };
+        let in_source = share(&self.of_source, &self.target, &T_target_source.inverse());
+        let in_target = share(&self.of_target, self.source, T_target_source);
+        // The larger one, or the one that is known.
+        in_source.max(in_target)
+    }
+}
+
+/// What a sensor saw that has seen all points of its scan.
+struct SensorView {
+    viewpoint: [f64; 3],
+    image: SphericalRangeImage,
+}
+
+impl SensorView {
+    /// `None` where no viewpoint is known, or it cannot have seen all: scans that were fused from several views.
+    fn new(
+        scan: &CenteredScan,
+        sample: &[[f64; 3]],
+        voxel: f64,
+        settings: &FreeSpaceSettings,
+    ) -> Option<Self> {
+        let viewpoint = scan.viewpoint.filter(|&viewpoint| all_seen_from(viewpoint, sample, voxel))?;
+        let about = |point: &[f64; 3]| std::array::from_fn(|k| point[k] - viewpoint[k]);
+        let seen: Vec<[f64; 3]> = scan.points.iter().map(about).collect();
+        let image = RangeImageSettings {
+            pixel: settings.pixel,
+            margin: settings.margin * voxel,
+            relative_margin: settings.relative_margin,
+        };
+        Some(Self { viewpoint, image: SphericalRangeImage::new(&seen, image) })
+    }
+
+    /// The share of points in free space, of those that the sensor would have measured; NaN where these are few.
+    fn free_space(&self, points: &[[f64; 3]], to_scan: &RigidTransform, min_points: usize) -> f64 {
+        let (mut free, mut in_sight) = (0_usize, 0_usize);
+        for point in points {
+            let moved = to_scan.transform_point(*point);
+            let visibility = self.image.visibility(std::array::from_fn(|k| moved[k] - self.viewpoint[k]));
+            free += usize::from(visibility == Visibility::FreeSpace);
+            in_sight += usize::from(visibility.is_in_sight());
+        }
+        if in_sight < min_points { f64::NAN } else { free as f64 / in_sight as f64 }
+    }
+}

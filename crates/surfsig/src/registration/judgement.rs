@@ -1,0 +1,130 @@
+//! The tests that a transform must survive before it is trusted.
+
+use super::doubt::Doubt;
+use super::free_space::BothSensors;
+use super::settings::RegistrationSettings;
+use crate::alignment::{Alternative, FreeDirection, PointToSurface, Rivals, TargetSurface};
+use crate::geometry::RigidTransform;
+use crate::random::some_of;
+
+/// Two scans about their middles, of which transforms are judged.
+pub(super) struct Judge<'a> {
+    pub surface: &'a TargetSurface,
+    /// The source's points that are fitted.
+    pub sample: &'a [[f64; 3]],
+    pub sensors: BothSensors<'a>,
+    /// Of the patches.
+    pub radius: f64,
+    pub settings: &'a RegistrationSettings,
+}
+
+/// What the tests said of a transform.
+pub(super) struct Judgement {
+    pub doubts: Vec<Doubt>,
+    pub free_directions: Vec<FreeDirection>,
+    pub alternatives: Vec<Alternative>,
+    pub explained: f64,
+    pub free_space: f64,
+    pub scale: f64,
+    pub scale_standard_error: f64,
+    /// A rival that explains more, or leaves less in free space.
+    pub better: Option<RigidTransform>,
+}
+
+impl Judge<'_> {
+    /// Judges a transform beside others that were proposed; `inliers` are the matches that agree, `None` where a start
+    /// was given.
+    pub fn judged(
+        &self,
+        found: &PointToSurface,
+        proposed: &[RigidTransform],
+        inliers: Option<usize>,
+    ) -> Judgement {
+        let settings = self.settings;
+        let numbers = some_of(self.sample.len(), settings.rivals.points);
+        let some: Vec<[f64; 3]> = numbers.into_iter().map(|i| self.sample[i]).collect();
+        let rivals = Rivals {
+            surface: self.surface,
+            source: &some,
+            best: found,
+            radius: self.radius,
+            settings: settings.rivals,
+            fit: settings.rival_fit,
+        };
+        let best = rivals.explained();
+        let free_space = self.sensors.free_space(&found.T_target_source);
+        let alternatives: Vec<Alternative> = rivals
+            .as_good_as_the_best(&best, proposed)
+            .into_iter()
+            .map(|(transform, explained)| Alternative {
+                T_target_source: transform,
+                explained,
+                free_space: self.sensors.free_space(&transform),
+            })
+            // What a sensor looked through refutes a rival, too. NaN refutes nothing.
+            .filter(|rival| !(rival.free_space > free_space + settings.free_space.excess))
+            .collect();
+        let is_better = |rival: &&Alternative| {
+            rival.free_space < free_space - settings.free_space.excess
+                || rival.explained > (1.0 + settings.rivals.deficit) * best.share()
+        };
+        let mut judged = Judgement {
+            better: alternatives.iter().find(is_better).map(|rival| rival.T_target_source),
+            doubts: Vec::new(),
+            free_directions: rivals.free_directions(&best),
+            alternatives,
+            explained: best.share(),
+            free_space,
+            scale: f64::NAN,
+            scale_standard_error: f64::NAN,
+        };
+        self.scale(&rivals, &mut judged);
+        self.doubt(found, inliers, &mut judged);
+        judged
+    }
+
+    fn doubt(&self, found: &PointToSurface, inliers: Option<usize>, judged: &mut Judgement) {
+        let settings = self.settings;
+        let doubts = &mut judged.doubts;
+        let is_certain = judged.free_space <= settings.free_space.certain_share
+            && judged.explained >= settings.certain_explained;
+        let needed = if is_certain { settings.certain_inliers } else { settings.trusted_inliers };
+        if let Some(inliers) = inliers.filter(|&inliers| inliers < needed) {
+            doubts.push(Doubt::FewMatches { inliers, needed });
+        }
+        let overlap = found.overlap;
+        let least = match inliers {
+            None => settings.trusted_overlap_of_start,
+            Some(_) => settings.trusted_overlap,
+        };
+        if overlap < least {
+            doubts.push(Doubt::LittleOverlap { overlap });
+        }
+        if !judged.free_directions.is_empty() {
+            doubts.push(Doubt::FreeDirections { count: judged.free_directions.len() });
+        }
+        if judged.free_space > settings.free_space.doubted_share {
+            doubts.push(Doubt::FreeSpace { share: judged.free_space });
+        }
+        if !judged.alternatives.is_empty() {
+            doubts.push(Doubt::Ambiguous { alternatives: judged.alternatives.len() });
+        }
+    }
+
+    /// Whether a source of another size fits better.
+    fn scale(&self, rivals: &Rivals<'_>, judged: &mut Judgement) {
+        let moved = rivals.best.T_target_source.transform_points(rivals.source);
+        let Some(found) = self.surface.scale_of(&moved, &self.settings.rival_fit) else { return };
+        judged.scale = found.scale;
+        judged.scale_standard_error = found.standard_error;
+        let off = found.scale.ln().abs();
+        let is_significant = off > self.settings.scale_deviations * found.standard_error / found.scale;
+        let deficit = rivals.explained().deficit_of(&rivals.closeness_of(&found.points));
+        if is_significant
+            && off > self.settings.doubted_scale
+            && deficit.is_some_and(|(deficit, _)| deficit < 0.0)
+        {
+            judged.doubts.push(Doubt::Scale { scale: found.scale, standard_error: found.standard_error });
+        }
+    }
+}

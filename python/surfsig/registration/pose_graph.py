@@ -1,0 +1,158 @@
+"""Poses of many scans from poses of pairs: least squares on a graph, robust against a pair that is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.sparse import lil_matrix
+
+from surfsig import geometry
+
+Array = NDArray[np.float64]
+
+_UNDETERMINED = 1e-9
+"""Of the largest eigenvalue of an information matrix, below which a direction says nothing."""
+_ROBUST = 3.0
+"""Standard deviations beyond which a residual counts less than its square (`soft_l1`)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """A measured pose between two scans."""
+
+    source: int
+    target: int
+    T_target_source: Array
+    """(4, 4)."""
+    covariance: Array
+    """(6, 6), of the twist about `center` in the target's axes, rotation first."""
+    center: Array
+    """(3,), in the target's coordinates."""
+    weight: float
+    """How much speaks for it; the tree that poses begin with takes the heaviest edges."""
+
+    def square_root_information(self) -> Array:
+        """Give W with W^T W the inverse of the covariance, in the directions that are determined."""
+        scale = np.sqrt(np.maximum(np.diag(self.covariance), np.finfo(float).tiny))
+        values, vectors = np.linalg.eigh(self.covariance / np.outer(scale, scale))
+        values = np.maximum(values, _UNDETERMINED * values.max())
+        return np.asarray((vectors / np.sqrt(values)).T / scale)
+
+    def twist(self, T_world_source: Array, T_world_target: Array) -> Array:
+        """Give the twist, (6,), about `center`, from the measured pose to the one that two poses imply."""
+        implied = geometry.inverse(T_world_target) @ T_world_source
+        to_center = geometry.from_translation(self.center)
+        off = geometry.inverse(to_center) @ implied @ geometry.inverse(self.T_target_source) @ to_center
+        return geometry.log_pose(off)
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Poses that agree best with all edges."""
+
+    T_world_scan: Array
+    """(n, 4, 4); NaN for scans that no edge joins to the first one."""
+    covariance: Array
+    """(n, 6, 6), of the twist of each scan about its own origin, in its own axes; 0 for the first one."""
+    residuals: Array
+    """(edges,), of each edge the root of its squared residual over its covariance, a sixth of it; NaN for an
+    edge that is not joined to the first scan."""
+
+
+def solve(count: int, first: int, edges: Sequence[Edge]) -> Solution:
+    """Fit poses to edges, the first scan at the identity.
+
+    Parameters
+    ----------
+    count
+        Of scans.
+    first
+        The scan whose coordinates are the world's.
+    edges
+        Between numbers of scans.
+
+    Returns
+    -------
+    Solution
+    """
+    poses = spanning_poses(count, first, edges)
+    is_joined = np.isfinite(poses).all(axis=(1, 2))
+    used = [edge for edge in edges if is_joined[edge.source]]
+    free = [scan for scan in np.flatnonzero(is_joined).tolist() if scan != first]
+    covariance = np.full((count, 6, 6), np.nan)
+    covariance[first] = 0.0
+    residuals = np.full(len(edges), np.nan)
+    if not free:
+        return Solution(poses, covariance, residuals)
+    # The unknowns are twists of each scan in its own axes, in units in which rotations move points as far as
+    # translations do.
+    reach = max(1e-12, float(np.median([np.linalg.norm(edge.center) for edge in used])))
+    unit = np.array([1.0 / reach] * 3 + [1.0] * 3)
+    column = {scan: 6 * number for number, scan in enumerate(free)}
+    weights = [edge.square_root_information() for edge in used]
+
+    def moved(unknowns: Array) -> Array:
+        result = poses.copy()
+        for scan, start in column.items():
+            result[scan] = poses[scan] @ geometry.exp_twist(unit * unknowns[start : start + 6])
+        return result
+
+    def distances(unknowns: Array) -> Array:
+        now = moved(unknowns)
+        return np.concatenate(
+            [
+                weight @ edge.twist(now[edge.source], now[edge.target])
+                for edge, weight in zip(used, weights, strict=True)
+            ]
+        )
+
+    pattern = lil_matrix((6 * len(used), 6 * len(free)), dtype=np.int8)
+    for row, edge in enumerate(used):
+        for scan in (edge.source, edge.target):
+            if scan != first:
+                pattern[6 * row : 6 * row + 6, column[scan] : column[scan] + 6] = 1
+    found = least_squares(
+        distances,
+        np.zeros(6 * len(free)),
+        jac="3-point",
+        jac_sparsity=pattern.tocsr(),
+        x_scale="jac",
+        loss="soft_l1",
+        f_scale=_ROBUST,
+    )
+    poses = moved(found.x)
+    for number, edge in enumerate(edges):
+        if is_joined[edge.source]:
+            off = edge.square_root_information() @ edge.twist(poses[edge.source], poses[edge.target])
+            residuals[number] = np.sqrt(np.mean(off**2))
+    # Loops that close worse than the edges say: their errors were too small, by so much.
+    redundant = 6 * (len(used) - len(free))
+    factor = 6.0 * float(np.nansum(residuals**2)) / redundant if redundant else 1.0
+    jacobian = found.jac.toarray() if hasattr(found.jac, "toarray") else found.jac
+    inverse = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
+    for scan, start in column.items():
+        block = inverse[start : start + 6, start : start + 6]
+        covariance[scan] = max(1.0, factor) * block * np.outer(unit, unit)
+    return Solution(poses, covariance, residuals)
+
+
+def spanning_poses(count: int, first: int, edges: Sequence[Edge]) -> Array:
+    """Chain poses along the tree of the heaviest edges (Prim); (n, 4, 4), NaN where no edge leads."""
+    poses = np.full((count, 4, 4), np.nan)
+    poses[first] = np.eye(4)
+    reached = {first}
+    while True:
+        leading = [edge for edge in edges if (edge.source in reached) != (edge.target in reached)]
+        if not leading:
+            return poses
+        edge = max(leading, key=lambda edge: edge.weight)
+        if edge.target in reached:
+            poses[edge.source] = poses[edge.target] @ edge.T_target_source
+            reached.add(edge.source)
+        else:
+            poses[edge.target] = poses[edge.source] @ geometry.inverse(edge.T_target_source)
+            reached.add(edge.target)

@@ -1,0 +1,86 @@
+"""Poses of many scans from poses of pairs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from surfsig import geometry
+from surfsig.registration.pose_graph import Edge, solve
+
+NOISE = np.array([2e-3, 1e-3, 3e-3, 0.01, 0.02, 0.015])
+
+
+def truth(count: int, seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[1:, :3, :3] = Rotation.random(count - 1, rng=rng).as_matrix()
+    poses[1:, :3, 3] = rng.uniform(-20.0, 20.0, (count - 1, 3))
+    return poses
+
+
+def edge(poses: np.ndarray, source: int, target: int, seed: int, noise: float = 1.0) -> Edge:
+    """A measured pose: T_true = T(c) exp(twist) T(-c) T_measured, as a registration's covariance says."""
+    rng = np.random.default_rng([source, target, seed])
+    exact = np.linalg.inv(poses[target]) @ poses[source]
+    center = rng.uniform(-5.0, 5.0, 3)
+    about = geometry.from_translation(center)
+    twist = noise * rng.normal(0.0, NOISE)
+    measured = about @ geometry.exp_twist(-twist) @ geometry.inverse(about) @ exact
+    return Edge(source, target, measured, np.diag(NOISE**2), center, 1.0)
+
+
+PAIRS = [(1, 0), (2, 1), (3, 2), (4, 3), (0, 4), (2, 0), (3, 1)]
+
+
+def test_exact_pairs_give_the_exact_poses() -> None:
+    poses = truth(5, 1)
+    found = solve(5, 0, [edge(poses, a, b, 2, noise=0.0) for a, b in PAIRS])
+    assert np.abs(found.T_world_scan - poses).max() < 1e-9
+    assert np.nanmax(found.residuals) < 1e-6
+
+
+def test_errors_are_as_large_as_the_covariance_says() -> None:
+    poses = truth(5, 3)
+    squares = []
+    for seed in range(30):
+        found = solve(5, 0, [edge(poses, a, b, seed) for a, b in PAIRS])
+        for scan in range(1, 5):
+            twist = geometry.log_pose(geometry.inverse(found.T_world_scan[scan]) @ poses[scan])
+            squares.append(twist @ np.linalg.solve(found.covariance[scan], twist) / 6.0)
+    # The residuals may enlarge a covariance, and never make it smaller.
+    assert 0.6 < np.mean(squares) < 1.2
+
+
+def test_one_wrong_pair_hardly_moves_the_others() -> None:
+    poses = truth(5, 4)
+    edges = [edge(poses, a, b, 5) for a, b in PAIRS]
+    wrong = edge(poses, 3, 0, 6)
+    shifted = wrong.T_target_source.copy()
+    shifted[:3, 3] += 8.0
+    lighter = Edge(3, 0, shifted, wrong.covariance, wrong.center, 0.1)
+    found = solve(5, 0, [*edges, lighter])
+    assert np.linalg.norm(found.T_world_scan[:, :3, 3] - poses[:, :3, 3], axis=1).max() < 0.5
+    assert found.residuals[-1] > 20.0 * found.residuals[:-1].max()
+
+
+def test_scans_without_a_pair_have_no_pose() -> None:
+    poses = truth(4, 7)
+    found = solve(4, 0, [edge(poses, 1, 0, 1), edge(poses, 3, 2, 1)])
+    assert np.isfinite(found.T_world_scan[:2]).all()
+    assert np.isnan(found.T_world_scan[2:]).all()
+    assert np.isnan(found.residuals[1])
+    alone = solve(2, 1, [])
+    assert np.array_equal(alone.T_world_scan[1], np.eye(4))
+    assert np.isnan(alone.covariance[0]).all()
+
+
+@pytest.mark.parametrize("first", [0, 2])
+def test_the_reference_changes_nothing_but_the_axes(first: int) -> None:
+    poses = truth(5, 8)
+    edges = [edge(poses, a, b, 9) for a, b in PAIRS]
+    found = solve(5, first, edges).T_world_scan
+    other = solve(5, 4, edges).T_world_scan
+    relative = [np.linalg.inv(each[1]) @ each[3] for each in (found, other)]
+    assert np.abs(relative[0] - relative[1]).max() < 1e-5
