@@ -275,7 +275,7 @@ class _Graph:
         return max(range(self.count), key=lambda scan: (groups[scan], pairs[scan], -scan))
 
     def _confirmed(self, used: set[int], refused: set[int]) -> set[int]:
-        """Give pairs that are not trusted, but close a loop of three, in which no other pose explains as much."""
+        """Give pairs that are not trusted, but close a loop of three, and have no rivals."""
         pairs = {}
         for number, (source, target, result) in enumerate(self.found):
             is_open = len(result.alternatives) > 0 or result.free_space > _SEEN_THROUGH
