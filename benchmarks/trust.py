@@ -58,7 +58,7 @@ def _two_places(
         yaws = (yaws[0], yaws[0] + rng.uniform(-0.4, 0.4))
     for side, yaw in zip((-0.5, 0.5), yaws, strict=True):
         x, y = side * step * np.cos(about), side * step * np.sin(about)
-        pose = simulate.upright_pose(x, y, height, yaw, rng.normal(0.0, 0.03, 2))
+        pose = simulate.upright_pose(x, y, height, yaw, rng.normal(0.0, 0.03, 2).tolist())
         if isinstance(sensor, simulate.DepthCamera):
             # The camera's z axis looks ahead, its y axis down.
             pose[:3, :3] = pose[:3, :3] @ np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
@@ -66,7 +66,7 @@ def _two_places(
     source, target = (
         simulate.scan(scene, sensor, pose, seed=2 * seed + number) for number, pose in enumerate(poses)
     )
-    to_target = np.linalg.inv(poses[1])
+    to_target = simulate.inverse(poses[1])
     return Pair(source, target, [to_target @ poses[0]], to_target)
 
 
@@ -110,7 +110,7 @@ def _along_x(build: Callable[[int], simulate.Scene], lines: int) -> Callable[[in
         source, target = (
             simulate.scan(scene, sensor, pose, seed=2 * seed + number) for number, pose in enumerate(poses)
         )
-        to_target = np.linalg.inv(poses[1])
+        to_target = simulate.inverse(poses[1])
         return Pair(source, target, [to_target @ poses[0]], to_target, free=to_target[:3, 0])
 
     return pair
@@ -203,7 +203,9 @@ def is_right(found: Array, right: list[Array], extent: float) -> list[bool]:
     ]
 
 
-def measured(case: str, seeds: list[int], detail: bool, settings: surfsig.RegistrationSettings) -> list[str]:
+def measured(
+    case: str, seeds: list[int], detail: bool, settings: surfsig.RegistrationSettings
+) -> tuple[str, ...]:
     """Register all pairs of a case; give its row."""
     trusted_right = trusted = right = named = listed = 0
     seconds = []
@@ -236,7 +238,7 @@ def measured(case: str, seeds: list[int], detail: bool, settings: surfsig.Regist
             ]
             print(" ".join(parts), flush=True)
     count = len(seeds)
-    return [
+    return (
         case,
         f"{right} of {count}",
         f"{trusted} of {count}",
@@ -244,7 +246,7 @@ def measured(case: str, seeds: list[int], detail: bool, settings: surfsig.Regist
         f"{named} of {count}" if free else "-",
         f"{listed} of {count}" if equals else "-",
         f"{np.median(seconds):.2f}",
-    ]
+    )
 
 
 def _is_along(direction: surfsig.FreeDirection, axis: Array | None) -> bool:

@@ -72,8 +72,8 @@ def check(found: Registration, expected: surfsig.Registration) -> None:
         np.testing.assert_equal(getattr(found, name), getattr(expected, name))
     assert bin(found.doubts).count("1") == len(expected.reasons)
     assert found.alternative_count == len(expected.alternatives)
-    for ours, theirs in zip(found.alternatives, expected.alternatives, strict=False):
-        np.testing.assert_array_equal(ours.array(), theirs.T_target_source)
+    for other, rival in zip(found.alternatives, expected.alternatives, strict=False):
+        np.testing.assert_array_equal(other.array(), rival.T_target_source)
 
 
 def test_registrations_are_those_of_python(

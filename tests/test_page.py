@@ -39,7 +39,24 @@ def places(trace: dict[str, Any]) -> np.ndarray:
 
 def registration() -> Registration:
     """Give a registration by `POSE`."""
-    return Registration(POSE, 1e-4 * np.eye(6), np.zeros(3), [], 30, 25, 0.5, 0.001, 0.1, True)
+    return Registration(
+        T_target_source=POSE,
+        covariance=1e-4 * np.eye(6),
+        center=np.zeros(3),
+        free_directions=[],
+        matches=30,
+        inliers=25,
+        overlap=0.5,
+        rms=0.001,
+        radius=0.1,
+        trusted=True,
+        reasons=[],
+        alternatives=[],
+        explained=0.5,
+        free_space=float("nan"),
+        scale=1.0,
+        scale_standard_error=0.01,
+    )
 
 
 def test_a_registration_s_page_moves_the_source(tmp_path: Path) -> None:

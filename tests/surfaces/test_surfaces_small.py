@@ -33,7 +33,7 @@ def bumpy_ball(noise: float, count: int = 20_000) -> Array:
     towards = rng.normal(size=(count, 3))
     towards /= np.linalg.norm(towards, axis=1)[:, None]
     waves = [0.03 * np.sin(towards @ rng.normal(0, 4, 3) + rng.uniform(0, 6)) for _ in range(12)]
-    return towards * (1 + np.sum(waves, axis=0))[:, None] + noise * rng.normal(size=(count, 3))
+    return np.asarray(towards * (1 + np.sum(waves, axis=0))[:, None] + noise * rng.normal(size=(count, 3)))
 
 
 def bumpy_field(noise: float, count: int = 20_000) -> Array:

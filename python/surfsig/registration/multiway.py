@@ -69,7 +69,7 @@ class MultiwayRegistration:
     @property
     def belongs(self) -> NDArray[np.bool_]:
         """(n,), whether a scan has a pose."""
-        return np.isfinite(self.T_reference_scan).all(axis=(1, 2))
+        return np.asarray(np.isfinite(self.T_reference_scan).all(axis=(1, 2)))
 
     def __repr__(self) -> str:
         """Say what was found."""
@@ -103,7 +103,7 @@ class MultiwayRegistration:
         numbers = np.flatnonzero(self.belongs)
         moved = [
             transform_cloud(self.T_reference_scan[number], PointCloud.of(clouds[number]))
-            for number in numbers
+            for number in numbers.tolist()
         ]
         cloud = joined(moved, "the scans that belong together")
         scan = numbers[cloud.fields["file"]] if len(moved) > 1 else np.full(len(cloud), numbers[0])
@@ -116,7 +116,7 @@ class MultiwayRegistration:
         -------
         Name, place, standard deviation of the place, and how many pairs hold it, of each scan.
         """
-        rows = []
+        rows: list[tuple[str, ...]] = []
         for number, name in enumerate(self.names):
             held = sum(pair.used and number in (pair.source, pair.target) for pair in self.pairs)
             if not self.belongs[number]:

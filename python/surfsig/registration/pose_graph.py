@@ -80,7 +80,7 @@ def solve(count: int, first: int, edges: Sequence[Edge]) -> Solution:
     Solution
     """
     poses = spanning_poses(count, first, edges)
-    is_joined = np.isfinite(poses).all(axis=(1, 2))
+    is_joined = np.asarray(np.isfinite(poses).all(axis=(1, 2)))
     used = [edge for edge in edges if is_joined[edge.source]]
     free = [scan for scan in np.flatnonzero(is_joined).tolist() if scan != first]
     covariance = np.full((count, 6, 6), np.nan)

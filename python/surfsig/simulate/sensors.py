@@ -88,7 +88,7 @@ class DepthCamera:
             (np.arange(self.height) + 0.5 - self.height / 2.0) / focal,
         )
         rays = np.stack([x, y, np.ones_like(x)], -1).reshape(-1, 3)
-        return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
 def scan(

@@ -62,7 +62,10 @@ impl Judge<'_> {
                 free_space: self.sensors.free_space(&transform),
             })
             // What a sensor looked through refutes a rival, too. NaN refutes nothing.
-            .filter(|rival| !(rival.free_space > free_space + settings.free_space.excess))
+            .filter(|rival| {
+                let excess = rival.free_space - free_space;
+                excess.is_nan() || excess <= settings.free_space.excess
+            })
             .collect();
         let is_better = |rival: &&Alternative| {
             rival.free_space < free_space - settings.free_space.excess

@@ -31,6 +31,10 @@ const NEAR: f64 = 4.0;
 /// 99.9 % quantiles of chi-square with 3 to 7 degrees of freedom: of a thousand pieces one stays apart by chance.
 const QUANTILES: [f64; 5] = [16.27, 18.47, 20.52, 22.46, 24.32];
 
+/// What the sum of squares may grow by, as a share of it: where errors have so much in common that chance allows anything,
+/// nothing is known to be one.
+const LARGEST_GROWTH: f64 = 0.25;
+
 /// Blocks in which errors in common are looked for.
 const BLOCKS: [usize; 2] = [8, 16];
 
@@ -137,7 +141,8 @@ impl Piece {
             let fitted = refine(start, &points, extent(&points), scene.termination(noise))?;
             let fewer = own + others - start.kind.parameters();
             let growth = count * fitted.rms * fitted.rms - separate;
-            let same = growth <= QUANTILES[fewer - 3] * variance * effect || fitted.rms <= scene.floor;
+            let chance = (QUANTILES[fewer - 3] * variance * effect).min(LARGEST_GROWTH * separate);
+            let same = growth <= chance || fitted.rms <= scene.floor;
             same.then_some(fitted.primitive)
         })
     }

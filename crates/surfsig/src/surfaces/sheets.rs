@@ -147,7 +147,7 @@ mod tests {
         let mut draws = Draws(5);
         let place = |i: usize| {
             let x = draws.between(-1.0, 1.0);
-            let is_upper = if is_step { x > 0.0 } else { i % 2 == 0 };
+            let is_upper = if is_step { x > 0.0 } else { i.is_multiple_of(2) };
             let z = 0.01 * draws.normal() + if is_upper { separation } else { 0.0 };
             Vector::new(x, draws.between(-1.0, 1.0), z)
         };
