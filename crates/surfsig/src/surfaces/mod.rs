@@ -168,18 +168,21 @@ fn regions(
         if level > levels[0] {
             scene.look_farther(level, monitor)?;
         }
-        let seed = |point: usize| scene.labels[point] == NONE && scene.noise[point].is_finite();
-        let left = scene.chosen.iter().copied().filter(|&point| seed(point as usize));
-        let mut seeds: Vec<u32> = left.step_by(scene.chosen.len().div_ceil(MOST_SEEDS)).collect();
-        seeds.sort_by(|&a, &b| scene.noise[a as usize].total_cmp(&scene.noise[b as usize]));
+        let mut seeds = scene.seeds(MOST_SEEDS);
         if unknown {
-            unknown = !likeness::learn(scene, &seeds, |scene, seed, enough| {
+            let mut grow = |scene: &Scene, seed: u32, enough: usize| {
                 let (seen, inside) = (&mut seen, &mut inside);
                 let evidence = Evidence::of(enough / 40);
                 Grower { scene, kinds, evidence, first: level, enough, seen, inside }
                     .largest_around(seed)
                     .ok()
-            });
+            };
+            unknown = !likeness::learn(scene, &seeds, &mut grow);
+            // Errors that neighbours have in common look like a second sheet.
+            if scene.likeness.alike > 1.0 && scene.forget_sheets() {
+                seeds = scene.seeds(MOST_SEEDS);
+                unknown = !likeness::learn(scene, &seeds, &mut grow);
+            }
         }
         // A point that took part in a failure is no seed any more.
         let mut tried = vec![false; count];

@@ -73,6 +73,8 @@ pub(super) struct Scene {
     pub noise: Vec<f64>,
     /// Whether they are known of the point's own sheet, of two that are near each other.
     pub is_on_sheet: Vec<bool>,
+    /// Noise and normals that points on sheets had before.
+    before_sheets: Vec<(u32, f64, Vector)>,
     pub graph: Graph,
     /// Points among which surfaces grow, ascending: all, or one of each clump.
     pub chosen: Vec<u32>,
@@ -117,6 +119,7 @@ impl Scene {
             is_exact: false,
             noise: vec![f64::INFINITY; points.len()],
             is_on_sheet: vec![false; points.len()],
+            before_sheets: Vec::new(),
             normals: vec![Vector::repeat(f64::NAN); points.len()],
             labels: vec![NONE; points.len()],
             points,
@@ -232,11 +235,39 @@ impl Scene {
     pub fn set_sheet(&mut self, point: u32, sheets: &Sheets) {
         let noise = self.known.unwrap_or(sheets.noise);
         if sheets.are_apart(noise) && (!self.is_exact || self.is_noiseless(noise)) {
-            let point = point as usize;
-            self.noise[point] = noise;
-            self.normals[point] = sheets.normal;
-            self.is_on_sheet[point] = true;
+            let index = point as usize;
+            self.before_sheets.push((point, self.noise[index], self.normals[index]));
+            self.noise[index] = noise;
+            self.normals[index] = sheets.normal;
+            self.is_on_sheet[index] = true;
         }
+    }
+
+    /// Takes sheets for one surface again, and nothing as learnt; tells whether there were any.
+    pub fn forget_sheets(&mut self) -> bool {
+        let before = std::mem::take(&mut self.before_sheets);
+        for &(point, noise, normal) in &before {
+            let index = point as usize;
+            self.noise[index] = noise;
+            self.normals[index] = normal;
+            self.is_on_sheet[index] = false;
+        }
+        if !before.is_empty() {
+            (self.likeness, self.common_noise) = (Likeness::NONE, f64::INFINITY);
+        }
+        !before.is_empty()
+    }
+
+    /// At most so many unlabelled points from which surfaces grow, those with the least noise first.
+    pub fn seeds(&self, most: usize) -> Vec<u32> {
+        let is_seed = |&point: &u32| {
+            let index = point as usize;
+            self.labels[index] == NONE && self.noise[index].is_finite()
+        };
+        let left = self.chosen.iter().copied().filter(is_seed);
+        let mut seeds: Vec<u32> = left.step_by(self.chosen.len().div_ceil(most)).collect();
+        seeds.sort_by(|&a, &b| self.noise[a as usize].total_cmp(&self.noise[b as usize]));
+        seeds
     }
 
     /// So many unlabelled points around a seed from which a surface begins, of its own sheet only where there are two.

@@ -7,6 +7,7 @@
 use super::scene::{Scene, Stamps};
 use crate::primitive::{Vector, smallest};
 use nalgebra::Matrix3;
+use rustc_hash::FxHashMap;
 
 /// Points around a place that are looked at: neighbours and their neighbours.
 const AROUND: usize = 40;
@@ -32,6 +33,11 @@ const ROUNDS: usize = 3;
 /// One point in so many begins the search; around each that is on one of two sheets all others are looked at.
 const EVERY: usize = 16;
 
+/// Ratio of the separations of two neighbouring places, and cosine of the angle between their normals (15 degrees), up to
+/// which their sheets are the same.
+const SAME_SEPARATION: f64 = 1.3;
+const SAME_DIRECTION: f64 = 0.966;
+
 /// Two parallel planes through the points around a place.
 pub(super) struct Sheets {
     pub normal: Vector,
@@ -46,7 +52,7 @@ pub(super) fn tell_apart(scene: &mut Scene) {
     let mut is_queued = vec![false; scene.points.len()];
     let mut queue: Vec<u32> = scene.chosen.iter().copied().step_by(EVERY).collect();
     queue.iter().for_each(|&point| is_queued[point as usize] = true);
-    let mut found = Vec::new();
+    let mut found = Found::default();
     let mut next = 0;
     while next < queue.len() {
         let point = queue[next];
@@ -54,19 +60,53 @@ pub(super) fn tell_apart(scene: &mut Scene) {
         let around = scene.around(point, AROUND, &mut seen);
         let places: Vec<Vector> = around.iter().map(|&other| scene.points[other as usize]).collect();
         let Some(sheets) = Sheets::of(&places) else { continue };
-        found.push((point, sheets));
+        found.add(point, sheets);
         for other in scene.graph.of(point) {
             if !std::mem::replace(&mut is_queued[other as usize], true) {
                 queue.push(other);
             }
         }
     }
-    for (point, sheets) in found {
-        scene.set_sheet(point, &sheets);
+    for (point, sheets) in &found.all {
+        // All neighbours of a point that is on one of two sheets have been looked at.
+        let (mut alike, mut all) = (0, 0);
+        for next in scene.graph.of(*point) {
+            all += 1;
+            let other = found.of(next);
+            alike += usize::from(other.is_some_and(|other| sheets.are_those_of(other)));
+        }
+        if 2 * alike >= all {
+            scene.set_sheet(*point, sheets);
+        }
+    }
+}
+
+/// Sheets around points, and where each point's are.
+#[derive(Default)]
+struct Found {
+    all: Vec<(u32, Sheets)>,
+    places: FxHashMap<u32, usize>,
+}
+
+impl Found {
+    fn add(&mut self, point: u32, sheets: Sheets) {
+        self.places.insert(point, self.all.len());
+        self.all.push((point, sheets));
+    }
+
+    fn of(&self, point: u32) -> Option<&Sheets> {
+        self.places.get(&point).map(|&place| &self.all[place].1)
     }
 }
 
 impl Sheets {
+    /// Whether sheets next to these are the same two: clumps of points have a distance and a direction each.
+    fn are_those_of(&self, other: &Self) -> bool {
+        let is_as_far = self.separation <= SAME_SEPARATION * other.separation
+            && other.separation <= SAME_SEPARATION * self.separation;
+        is_as_far && self.normal.dot(&other.normal).abs() >= SAME_DIRECTION
+    }
+
     /// Whether they are told apart among noise.
     pub fn are_apart(&self, noise: f64) -> bool {
         self.separation > APART * noise
