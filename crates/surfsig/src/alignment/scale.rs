@@ -168,7 +168,7 @@ mod tests {
                 corner(900, 2, 0.1).iter().map(|point| point.map(|x| x * true_scale)).collect();
             let found = surface.scale_of(&source, &wide).unwrap();
             let off = (found.scale - true_scale).abs();
-            assert!(found.standard_error < 0.002, "{}", found.standard_error);
+            assert!(found.standard_error < 0.004, "{}", found.standard_error);
             assert!(off < 4.0 * found.standard_error + 2e-4, "{off} {}", found.standard_error);
         }
     }
