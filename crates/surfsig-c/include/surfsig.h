@@ -32,6 +32,51 @@
 #define SURFSIG_FREE_DIRECTIONS 6
 
 /**
+ * Most alternatives that are given.
+ */
+#define SURFSIG_ALTERNATIVES 8
+
+/**
+ * A doubt: nothing was found.
+ */
+#define SURFSIG_DOUBT_NOT_FOUND 1
+
+/**
+ * A doubt: few matches agree.
+ */
+#define SURFSIG_DOUBT_FEW_MATCHES 2
+
+/**
+ * A doubt: little of the source lies on the target.
+ */
+#define SURFSIG_DOUBT_LITTLE_OVERLAP 4
+
+/**
+ * A doubt: the overlap does not determine all motions.
+ */
+#define SURFSIG_DOUBT_FREE_DIRECTIONS 8
+
+/**
+ * A doubt: points of one scan lie where the other's sensor looked through.
+ */
+#define SURFSIG_DOUBT_FREE_SPACE 16
+
+/**
+ * A doubt: other transforms explain as much.
+ */
+#define SURFSIG_DOUBT_AMBIGUOUS 32
+
+/**
+ * A doubt: the source is larger or smaller than the target.
+ */
+#define SURFSIG_DOUBT_SCALE 64
+
+/**
+ * A doubt: the source's mirror image fits better.
+ */
+#define SURFSIG_DOUBT_MIRRORED 128
+
+/**
  * Numbers of a signature.
  */
 #define SURFSIG_SIGNATURE 242
@@ -562,9 +607,13 @@ typedef struct {
    */
   bool found;
   /**
-   * Whether the transform is right, by what was seen; false where a direction is free.
+   * Whether the transform is right, by what was seen: no test has refuted it.
    */
   bool trusted;
+  /**
+   * Why it is not trusted: the sum of the SURFSIG_DOUBT_... that hold; 0 where it is.
+   */
+  uint32_t doubts;
   /**
    * Takes the source's points to the target.
    */
@@ -598,6 +647,31 @@ typedef struct {
    * Share of the source's surface that lies on the target's, 0 to 1.
    */
   double overlap;
+  /**
+   * The same, where points count the more the nearer they are.
+   */
+  double explained;
+  /**
+   * The larger share of one scan's points that lie where the other's sensor looked through; NaN where no viewpoint
+   * is known from which all was seen.
+   */
+  double free_space;
+  /**
+   * How many times as large as the target the source is; NaN where the overlap does not determine it.
+   */
+  double scale;
+  /**
+   * Its standard error.
+   */
+  double scale_standard_error;
+  /**
+   * Number of alternatives.
+   */
+  size_t alternative_count;
+  /**
+   * Other transforms that explain as much; NaN beyond the last.
+   */
+  surfsig_transform alternatives[SURFSIG_ALTERNATIVES];
   /**
    * Root mean square of the distances there, in the scans' unit.
    */

@@ -144,7 +144,12 @@ pub fn find_surfaces(
         if unexplained::add(&mut scene, &mut regions, &kinds, evidence, monitor)? {
             share_out(&mut scene, &mut regions);
         }
-        if !scene.is_exact && self::kinds::try_again(&mut scene, &mut regions, &kinds, evidence) {
+        // The likelihood of another kind is that of points that err each for itself.
+        let is_independent = scene.likeness.alike <= 1.0;
+        if !scene.is_exact
+            && is_independent
+            && self::kinds::try_again(&mut scene, &mut regions, &kinds, evidence)
+        {
             share_out(&mut scene, &mut regions);
         }
         pieces::join(&mut scene, &mut regions);
