@@ -224,7 +224,7 @@ def measured(
         right += any(agree)
         # Of poses that are open, none is right for certain.
         trusted_right += found.trusted and any(agree) and not free and not equals
-        named += free and any(_is_along(direction, pair.free) for direction in found.free_directions)
+        named += free and _is_named(found.free_directions, pair.free)
         listed += equals and all(covered)
         if detail:
             parts = [
@@ -249,11 +249,13 @@ def measured(
     )
 
 
-def _is_along(direction: surfsig.FreeDirection, axis: Array | None) -> bool:
-    """Whether a free translation is named within 15 degrees of an axis."""
-    if axis is None or direction.motion != "translation":
+def _is_named(directions: list[surfsig.FreeDirection], axis: Array | None) -> bool:
+    """Say whether an axis lies within 15 degrees of what the free translations span."""
+    free = [direction.axis for direction in directions if direction.motion == "translation"]
+    if axis is None or not free:
         return False
-    return bool(abs(np.dot(direction.axis, axis)) > np.cos(np.radians(15.0)))
+    basis, _ = np.linalg.qr(np.array(free).T)
+    return bool(np.linalg.norm(basis.T @ axis) > np.cos(np.radians(15.0)))
 
 
 COLUMNS = (
