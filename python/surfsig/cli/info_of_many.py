@@ -77,10 +77,7 @@ def _of_files(files: Any) -> Summary:
 def _of_tiles(tiles: Any) -> Summary:
     manifest, records = tiles.manifest, tiles.manifest["tiles"]
     missing = [part for part in tiles.tiles if part.error is not None]
-    status: dict[str, int] = {}
-    for record in records:
-        for name, count in record.get("status", {}).items():
-            status[name] = status.get(name, 0) + count
+    status = tiles.status_counts()
     values: dict[str, Any] = {
         "tiles": len(tiles.tiles),
         "missing_tiles": len(missing),

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
 _OPTIONS = ("tiles", "memory", "scheduler", "restart", "format_", "numbers", "store")
 
-# Bytes of memory that a point needs, its extraction and its file included, where all are in memory at once.
-_BYTES_PER_POINT = 190
-
 
 def tile_options(command: Function) -> Function:
     """Add what work in tiles can be asked for."""
@@ -113,7 +110,7 @@ def refuse_too_large(source: Any, told: str) -> None:
     """
     from surfsig import InvalidInputError
     from surfsig.cli.console import size_text
-    from surfsig.tiles.memory import LARGE_SHARE, total_bytes
+    from surfsig.tiles.memory import LARGE_SHARE, WHOLE_BYTES, total_bytes
     from surfsig.tiles.source import Source
 
     try:
@@ -134,7 +131,7 @@ def refuse_too_large(source: Any, told: str) -> None:
         except Exception:
             return
         points = opened.points if isinstance(opened, surfsig.FileDataset) else None
-        size = 0 if points is None else points * _BYTES_PER_POINT
+        size = 0 if points is None else points * WHOLE_BYTES
         if size <= total:
             return
     raise InvalidInputError(
@@ -180,10 +177,6 @@ def extract_in_tiles(
 
 def _summary(found: TileDataset, seconds: float) -> dict[str, Any]:
     records = found.manifest["tiles"]
-    status: dict[str, int] = {}
-    for record in records:
-        for name, count in record.get("status", {}).items():
-            status[name] = status.get(name, 0) + count
     points = len(found)
     return {
         "output": str(found.folder),
@@ -191,7 +184,7 @@ def _summary(found: TileDataset, seconds: float) -> dict[str, Any]:
         "points": points,
         "tiles": len(found.tiles),
         "read_per_point": sum(record.get("read", 0) for record in records) / max(points, 1),
-        "status": status,
+        "status": found.status_counts(),
         "seconds": seconds,
         "points_per_second": points / seconds if seconds else None,
     }

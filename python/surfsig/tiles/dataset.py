@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -127,6 +128,19 @@ class TileDataset:
         """Whether all tiles were worked on, and none is missing."""
         return bool(self.manifest["finished"]) and all(part.error is None for part in self.tiles)
 
+    def status_counts(self) -> dict[str, int]:
+        """Count the points of all parts by their status.
+
+        Returns
+        -------
+        dict
+            By the names of `Status`, those that occur.
+        """
+        counts: Counter[str] = Counter()
+        for record in self.manifest["tiles"]:
+            counts.update(record.get("status", {}))
+        return dict(counts)
+
     @property
     def paths(self) -> list[Path]:
         """The files of the parts."""
@@ -191,7 +205,10 @@ class TileDataset:
         InvalidInputError
             If PyArrow is not installed, or the parts have another format.
         """
-        self._check_parquet("a PyArrow dataset")
+        if self.manifest["arguments"]["suffix"] != ".parquet":
+            raise InvalidInputError(
+                f"{self.folder}: a PyArrow dataset needs parts in Parquet: suffix='.parquet'"
+            )
         dataset = pyarrow("pyarrow.dataset")
         return dataset.dataset([str(path) for path in self.paths], format="parquet")
 
@@ -210,10 +227,6 @@ class TileDataset:
         frames = library("dask.dataframe", "Dask's DataFrame", "'surfsig[scale]' 'dask[dataframe]'")
         first = next(iter(self.clouds())).at(np.arange(0))
         return frames.from_map(_data_frame, self.paths, meta=first.to_pandas())
-
-    def _check_parquet(self, what: str) -> None:
-        if self.manifest["arguments"]["suffix"] != ".parquet":
-            raise InvalidInputError(f"{self.folder}: {what} needs parts in Parquet: suffix='.parquet'")
 
 
 class FileDataset:
@@ -300,7 +313,7 @@ def _apart(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
 
 
 def _of_tiles(clouds: Sequence[PointCloud], source: str) -> PointCloud:
-    """Join parts; the number of the part is nobody's business."""
+    """Join parts, without the number of the part as a field."""
     cloud = joined(clouds, source)
     if len(clouds) > 1:
         fields = {name: values for name, values in cloud.fields.items() if name != "file"}

@@ -16,12 +16,15 @@ LARGE_SHARE = 0.25
 extraction needs more than the cloud."""
 
 BASE_BYTES = 330 << 20
-"""What a process needs beside its tile: Python, the libraries, blocks of LAZ that are decoded and written
-(measured by benchmarks/scale.py)."""
+"""What a process needs beside its tile: Python, the libraries, blocks of LAZ that are decoded and written. An
+estimate; with it, and the next one, benchmarks/scale.py stayed below what it was given."""
 
 POINT_BYTES = 260
 """What a point of a tile needs beside twice its row: the index, the columns of the extraction, and what the
-writer holds (measured by benchmarks/scale.py)."""
+writer holds; an estimate, too."""
+
+WHOLE_BYTES = 190
+"""What a point needs, its extraction and its file included, where all points are in memory at once."""
 
 FEWEST_POINTS = 20_000
 """Points of a tile, at least: with fewer, most of what is read would be halo."""
