@@ -50,6 +50,7 @@ def registration() -> Registration:
         rms=0.001,
         radius=0.1,
         trusted=True,
+        doubts=[],
         reasons=[],
         alternatives=[],
         explained=0.5,

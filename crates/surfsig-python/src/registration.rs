@@ -145,6 +145,8 @@ pub fn register<'py>(
     result.set_item("trusted", found.trusted)?;
     let reasons: Vec<String> = found.doubts.iter().map(ToString::to_string).collect();
     result.set_item("reasons", reasons)?;
+    let doubts: Vec<&str> = found.doubts.iter().map(surfsig::Doubt::name).collect();
+    result.set_item("doubts", doubts)?;
     let alternative = |one: &Alternative| (one.T_target_source.to_matrix(), one.explained, one.free_space);
     let alternatives: Vec<_> = found.alternatives.iter().map(alternative).collect();
     result.set_item("alternatives", alternatives)?;

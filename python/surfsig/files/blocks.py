@@ -42,52 +42,52 @@ class Finish:
         Whether colours are still as they are stored.
     bytes_in_16_bits, decimals
         What `with_colours` takes.
-    usual
+    defaults
         Fields that are left out where all points of the file have this value.
     """
 
     colours: bool = False
     bytes_in_16_bits: bool = False
     decimals: tuple[str, ...] | None = None
-    usual: Mapping[str, int] = field(default_factory=dict)
+    defaults: Mapping[str, int] = field(default_factory=dict)
 
-    def cloud(self, cloud: PointCloud, witnesses: PointCloud, source: str = "") -> PointCloud:
+    def cloud(self, cloud: PointCloud, sample: PointCloud, source: str = "") -> PointCloud:
         """Finish some points of a file.
 
         Parameters
         ----------
         cloud
             The points.
-        witnesses
-            What `witnesses_of` gives of all points of the file.
+        sample
+            What `sample_of` gives of all points of the file.
         source
             The file's name, for warnings.
 
         Returns
         -------
         PointCloud
-            The points, and the witnesses behind them.
+            The points, and the sample behind them.
         """
         fields = {
-            name: np.concatenate([values, witnesses.fields[name]])
+            name: np.concatenate([values, sample.fields[name]])
             for name, values in cloud.fields.items()
-            if not (name in self.usual and (witnesses.fields[name] == self.usual[name]).all())
+            if not (name in self.defaults and (sample.fields[name] == self.defaults[name]).all())
         }
         if self.colours:
             fields = with_colours(
                 fields, bytes_in_16_bits=self.bytes_in_16_bits, decimals=self.decimals, source=source
             )
-        offsets = np.concatenate([cloud.offsets, witnesses.offsets])
-        return replace(witnesses, offsets=offsets, fields=fields, grid=None)
+        offsets = np.concatenate([cloud.offsets, sample.offsets])
+        return replace(sample, offsets=offsets, fields=fields, grid=None)
 
-    def witnesses_of(self, cloud: PointCloud) -> PointCloud:
+    def sample_of(self, cloud: PointCloud) -> PointCloud:
         """Give a few points that say of their file's fields what all of these points say."""
         if not len(cloud):
             return replace(cloud, grid=None)
         chosen = {0}
         for name, values in cloud.fields.items():
-            if name in self.usual:
-                chosen.add(int(np.argmax(values != self.usual[name])))
+            if name in self.defaults:
+                chosen.add(int(np.argmax(values != self.defaults[name])))
             if self.colours and is_colour(name) and values.ndim == 1:
                 chosen |= {int(np.argmin(values)), int(np.argmax(values))}
                 if values.dtype.kind == "f":
@@ -164,7 +164,7 @@ def _opened(
 
         box = None if options.box is None else box_array(options.box)
         las = OpenLas(file, source, progress, box)
-        finish = Finish(colours=True, bytes_in_16_bits=True, usual=las.usual)
+        finish = Finish(colours=True, bytes_in_16_bits=True, defaults=las.defaults)
         # In a box nobody knows how many points there are before all are looked at.
         is_shared = share > 1 and box is None and las.only_beginnings(share)
         return OpenBlocks(finish, las.clouds(BLOCK_POINTS), las.header.point_count if is_shared else None)

@@ -71,7 +71,7 @@ def read(
         fields = {
             name: values
             for name, values in cloud.fields.items()
-            if name not in opened.usual or not (values == opened.usual[name]).all()
+            if name not in opened.defaults or not (values == opened.defaults[name]).all()
         }
         grid = opened.told.get("grid") if box is None else None
         return replace(
@@ -93,7 +93,7 @@ class OpenLas:
         As laspy has it.
     told
         What this library's writer told beside the points.
-    usual
+    defaults
         Of a file that surfsig wrote: the dimensions that are no fields where all points have this value.
 
     Raises
@@ -115,7 +115,7 @@ class OpenLas:
             self.told = _told(self.header)
             names = self.header.point_format.standard_dimension_names
             filled = self.told.get("dimensions", names)
-            self.usual = {name: _usual(name) for name in names if name not in filled}
+            self.defaults = {name: _default(name) for name in names if name not in filled}
 
     def columns(self) -> Iterator[dict[str, NDArray[Any]]]:
         """Give the points block by block, the first one without any: offsets (n, 3), and fields by name."""
@@ -276,6 +276,6 @@ def _told(header: LasHeader) -> dict[str, Any]:
     return {}
 
 
-def _usual(name: str) -> int:
+def _default(name: str) -> int:
     """Give what every point without it has of a dimension of the point format."""
     return 1 if name in ("return_number", "number_of_returns") else 0

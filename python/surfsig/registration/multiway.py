@@ -23,11 +23,9 @@ from surfsig.registration.search import register
 
 Array = NDArray[np.float64]
 
-_AGREE = 0.25
-"""Radii of a patch by which two poses move a scan's points apart, at most, that are the same one: within
-that, matches agree with a pose."""
-_SEEN_THROUGH = 0.02
-"""Share of points in free space from which on a pose is wrong, as for `register`."""
+_BY_LOOPS = {"few_matches", "little_overlap", "free_directions"}
+"""Doubts about a pair that a loop of three takes away: they say that little speaks for it, not that anything
+speaks against it."""
 _SAMPLE = 500
 """Points of a scan that tell by how much two poses differ."""
 
@@ -205,16 +203,11 @@ def register_multiway(
     numbers = list(itertools.combinations(range(len(scans)), 2))
     found: list[tuple[int, int, Registration]] = []
     for target, source in numbers:
-        found.append(
-            (
-                source,
-                target,
-                register(scans[source], scans[target], radius=radius, settings=settings, threads=threads),
-            )
-        )
+        result = register(scans[source], scans[target], radius=radius, settings=settings, threads=threads)
+        found.append((source, target, result))
         if report is not None:
             report(len(found), len(numbers))
-    graph = _Graph(scans, found)
+    graph = _Graph(scans, found, settings or RegistrationSettings())
     solution, reference, used = graph.solved()
     pairs = [
         RegisteredPair(source, target, result, number in used, float(used.get(number, np.nan)))
@@ -226,7 +219,14 @@ def register_multiway(
 class _Graph:
     """Scans and the poses between them."""
 
-    def __init__(self, scans: list[PointCloud], found: list[tuple[int, int, Registration]]) -> None:
+    def __init__(
+        self,
+        scans: list[PointCloud],
+        found: list[tuple[int, int, Registration]],
+        settings: RegistrationSettings,
+    ) -> None:
+        # Within that many radii of a patch matches agree with a pose: poses that differ by less are the same.
+        self._agree = settings.consensus_max_distance
         self.count = len(scans)
         self.found = found
         rng = np.random.default_rng(1)
@@ -275,11 +275,10 @@ class _Graph:
         return max(range(self.count), key=lambda scan: (groups[scan], pairs[scan], -scan))
 
     def _confirmed(self, used: set[int], refused: set[int]) -> set[int]:
-        """Give pairs that are not trusted, but close a loop of three, and have no rivals."""
+        """Give pairs that are not trusted, but close a loop of three, and that nothing speaks against."""
         pairs = {}
         for number, (source, target, result) in enumerate(self.found):
-            is_open = len(result.alternatives) > 0 or result.free_space > _SEEN_THROUGH
-            if number in used or not (number in refused or is_open):
+            if number in used or (number not in refused and _BY_LOOPS.issuperset(result.doubts)):
                 pairs[target, source] = number
         confirmed = set()
         for first, second, third in itertools.combinations(range(self.count), 3):
@@ -291,7 +290,7 @@ class _Graph:
             if not np.isfinite(chained @ both.T_target_source).all():
                 continue
             radius = min(one.radius, two.radius, both.radius)
-            if self._apart(third, chained, both.T_target_source) <= _AGREE * radius:
+            if self._apart(third, chained, both.T_target_source) <= self._agree * radius:
                 confirmed |= {pairs[corner] for corner in corners}
         return confirmed
 
@@ -299,7 +298,7 @@ class _Graph:
         """Say by how much a pair disagrees with the poses, 1 where it is left out."""
         source, target, result = self.found[number]
         implied = geometry.inverse(poses[target]) @ poses[source]
-        return self._apart(source, implied, result.T_target_source) / (_AGREE * result.radius)
+        return self._apart(source, implied, result.T_target_source) / (self._agree * result.radius)
 
     def _apart(self, scan: int, one: Array, other: Array) -> float:
         """Give the root mean square of the distances between a scan's points after either pose."""

@@ -62,8 +62,11 @@ class Registration:
     trusted: bool
     """Whether the pose is right, by what was seen: it was tried to be refuted, and was not. False where a
     direction is free, as any pose along it is as good."""
+    doubts: list[str]
+    """Names of the tests that it has not survived: not_found, few_matches, little_overlap, free_directions,
+    free_space, ambiguous, mirrored, scale; empty where it is trusted."""
     reasons: list[str]
-    """Why it is not trusted, in words; empty where it is."""
+    """The same in words."""
     alternatives: list[Alternative]
     """Other transforms that explain as much, as of a box that looks the same after half a turn."""
     explained: float
@@ -213,6 +216,7 @@ class Registration:
             "rms": _known(self.rms),
             "radius": self.radius,
             "trusted": self.trusted,
+            "doubts": self.doubts,
             "reasons": self.reasons,
             "alternatives": [
                 {

@@ -163,7 +163,7 @@ def _binned(
     for look in looks:
         look.take_over(survey)
     warn_of_differences(survey)
-    origins = np.array([head.witnesses.origin for head in survey.heads])
+    origins = np.array([head.sample.origin for head in survey.heads])
     for bin_number in range(len(plan)):
         for layout, kind in enumerate(layouts):
             _sort(rows_path(folder, bin_number, layout), kind, origins)

@@ -63,7 +63,7 @@ class CopcSource:
             for file, head in zip(self.files, self.heads, strict=True):
                 with open_blocks(file, ReadOptions(box=box)) as opened:
                     cloud = stacked(list(opened.clouds))
-                clouds.append(opened.finish.cloud(cloud, head.witnesses))
+                clouds.append(opened.finish.cloud(cloud, head.sample))
                 kept.append(np.arange(len(clouds[-1])) < len(cloud))
             return joined(clouds, str(self.files[0])).at(np.concatenate(kept))
 
@@ -125,20 +125,20 @@ def _look(one: _Indexed, number: int, first: int, sampling: Sampling, survey: Su
     with one.path.open("rb") as file:
         las = OpenLas(file, str(one.path), Progress(None, 0))
         header = las.header
-        finish = Finish(colours=True, bytes_in_16_bits=True, usual=las.usual)
+        finish = Finish(colours=True, bytes_in_16_bits=True, defaults=las.defaults)
         las.only([])
-        witnesses = stacked(list(las.clouds(BLOCK_POINTS)))
+        sample = stacked(list(las.clouds(BLOCK_POINTS)))
         for node in one.nodes:
             points = node.chunk.points
             if sampling.wants(first, first + points):
                 las.only([node.chunk])
                 cloud = stacked(list(las.clouds(BLOCK_POINTS)))
                 sampling.take(number, cloud, np.asarray(cloud.points, np.float64), first, first)
-                witnesses = finish.witnesses_of(stacked([witnesses, finish.witnesses_of(cloud)]))
+                sample = finish.sample_of(stacked([sample, finish.sample_of(cloud)]))
             first += points
     survey.files.append(one.path)
-    survey.heads.append(FileHead(finish, witnesses, one.points))
-    survey.layouts.append(Layout.of(witnesses))
+    survey.heads.append(FileHead(finish, sample, one.points))
+    survey.layouts.append(Layout.of(sample))
     survey.cells.add_cells(
         np.array([node.middle for node in one.nodes]).reshape(-1, 3),
         np.array([node.chunk.points for node in one.nodes], np.int64),

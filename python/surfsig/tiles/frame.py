@@ -1,6 +1,6 @@
 """Clouds of rows of several files, with the fields, types and origin that `surfsig.read` gives of all files.
 
-What the fields of each file become is seen at its witnesses, which are finished and joined as whole files
+What the fields of each file become is seen in its sample, which is finished and joined as whole files
 are. Where that is no more than another type, rows are put into their places at once; else they are
 finished, too.
 """
@@ -39,10 +39,8 @@ class Frame:
         """Make one cloud of the rows of all files."""
         if self._places is None:
             cloud = self._joined(parts)
-            lengths = [
-                (len(part), len(head.witnesses)) for part, head in zip(parts, self._heads, strict=True)
-            ]
-            kept = [np.arange(rows + witnesses) < rows for rows, witnesses in lengths]
+            lengths = [(len(part), len(head.sample)) for part, head in zip(parts, self._heads, strict=True)]
+            kept = [np.arange(rows + sample) < rows for rows, sample in lengths]
             return cloud.at(np.concatenate(kept))
         whole = self._whole
         ends = np.cumsum([0, *map(len, parts)])
@@ -55,7 +53,7 @@ class Frame:
             if not len(part):
                 continue
             rows = slice(int(ends[file]), int(ends[file + 1]))
-            origin = self._heads[file].witnesses.origin
+            origin = self._heads[file].sample.origin
             moved = origin.any() and not np.array_equal(origin, whole.origin)
             offsets[rows] = origin + part["offsets"] if moved else part["offsets"]
             for name, places in self._places.items():
@@ -65,7 +63,7 @@ class Frame:
         )
 
     def _joined(self, parts: Sequence[NDArray[Any]]) -> PointCloud:
-        """Join the rows of each file with its witnesses behind them."""
+        """Join the rows of each file with its sample behind them."""
         files = zip(self._heads, self._layouts, parts, strict=True)
         with warnings.catch_warnings():
             # They were given when the files were looked at.
@@ -79,7 +77,7 @@ class Frame:
         names = [self._names(head, layout, rows) for head, layout, rows in zip(
             self._heads, self._layouts, nothing, strict=True
         )]  # fmt: skip
-        ends = np.cumsum([0, *(len(head.witnesses) for head in self._heads)])
+        ends = np.cumsum([0, *(len(head.sample) for head in self._heads)])
         found: dict[str, list[int] | None] = {}
         for name, values in self._whole.fields.items():
             if several and name == FILE:
@@ -95,7 +93,7 @@ class Frame:
                     if len(expected):
                         return None
                     place = -1
-                elif not _is_cast(head.witnesses.fields[self._layouts[file].fields[place][0]], expected):
+                elif not _is_cast(head.sample.fields[self._layouts[file].fields[place][0]], expected):
                     return None
                 places.append(place)
             found[name] = places
@@ -105,11 +103,11 @@ class Frame:
     def _names(head: FileHead, layout: Layout, rows: NDArray[Any]) -> dict[str, int]:
         """Give the place in a row of each field of a finished file."""
         raw = [name for name, _, _ in layout.fields]
-        finish, witnesses = head.finish, head.witnesses
+        finish, sample = head.finish, head.sample
         kept = [
             place
             for place, name in enumerate(raw)
-            if not (name in finish.usual and (witnesses.fields[name] == finish.usual[name]).all())
+            if not (name in finish.defaults and (sample.fields[name] == finish.defaults[name]).all())
         ]
         # Finishing may rename fields, and keeps their order.
         return dict(zip(head.cloud(layout, rows).fields, kept, strict=True))

@@ -75,7 +75,7 @@ class FileHead:
     ----------
     finish
         What makes its rows what `surfsig.read` gives.
-    witnesses
+    sample
         A few of its points, which tell of its fields what all of them tell; with its origin, viewpoints and
         coordinate system.
     count
@@ -83,21 +83,21 @@ class FileHead:
     """
 
     finish: Finish
-    witnesses: PointCloud
+    sample: PointCloud
     count: int
 
     def cloud(self, layout: Layout, rows: NDArray[Any]) -> PointCloud:
-        """Give points of this file, and its witnesses behind them, as `surfsig.read` does."""
+        """Give points of this file, and its sample behind them, as `surfsig.read` does."""
         offsets, fields = layout.columns(rows)
-        head = self.witnesses
+        head = self.sample
         cloud = PointCloud(
             offsets, head.origin, head.viewpoint, fields, None, head.viewpoints, head.coordinate_system
         )
         return self.finish.cloud(cloud, head)
 
     def to_json(self) -> dict[str, Any]:
-        """Give everything but the witnesses' rows."""
-        cloud, finish = self.witnesses, self.finish
+        """Give everything but the sample's rows."""
+        cloud, finish = self.sample, self.finish
         system = cloud.coordinate_system
         return {
             "count": self.count,
@@ -109,13 +109,13 @@ class FileHead:
                 "colours": finish.colours,
                 "bytes_in_16_bits": finish.bytes_in_16_bits,
                 "decimals": finish.decimals,
-                "usual": dict(finish.usual),
+                "defaults": dict(finish.defaults),
             },
         }
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any], layout: Layout, rows: NDArray[Any]) -> FileHead:
-        """Take it back, with the witnesses' rows."""
+        """Take it back, with the sample's rows."""
         offsets, fields = layout.columns(rows)
         finish = values["finish"]
         decimals = finish["decimals"]
@@ -132,7 +132,7 @@ class FileHead:
                 finish["colours"],
                 finish["bytes_in_16_bits"],
                 None if decimals is None else tuple(decimals),
-                finish["usual"],
+                finish["defaults"],
             ),
             cloud,
             values["count"],

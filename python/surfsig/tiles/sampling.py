@@ -120,9 +120,7 @@ class Sampling:
     def facts(self, survey: Survey) -> WholeFacts:
         """Give what follows from all blocks, once `survey` has the heads of all files."""
         clouds = [
-            PointCloud(
-                np.concatenate([head.witnesses.offsets[:0], *self._offsets[file]]), head.witnesses.origin
-            )
+            PointCloud(np.concatenate([head.sample.offsets[:0], *self._offsets[file]]), head.sample.origin)
             for file, head in enumerate(survey.heads)
         ]
         whole = joined(clouds, "")

@@ -142,7 +142,7 @@ class Store:
 
     def coordinates(self, rows: NDArray[Any]) -> NDArray[np.float64]:
         """Give the true coordinates (n, 3) of rows."""
-        return coordinates(rows, np.array([head.witnesses.origin for head in self.heads]))
+        return coordinates(rows, np.array([head.sample.origin for head in self.heads]))
 
     def _cloud(
         self, parts: Sequence[Sequence[NDArray[Any]]], tile: int | None
@@ -201,8 +201,8 @@ class Store:
         """Write what makes a folder of rows a finished store."""
         for file, head in enumerate(self.heads):
             layout = self.layouts[self.layout_of_file[file]]
-            rows = layout.rows(head.witnesses, np.arange(len(head.witnesses), dtype=np.uint64), file)
-            with replacing(self.folder / f"witnesses_{file}.rows") as out:
+            rows = layout.rows(head.sample, np.arange(len(head.sample), dtype=np.uint64), file)
+            with replacing(self.folder / f"sample_{file}.rows") as out:
                 out.write(rows.tobytes())
         values = {
             "version": VERSION,
@@ -238,7 +238,7 @@ class Store:
         heads = []
         for file, head in enumerate(values["heads"]):
             layout = layouts[of_file[file]]
-            path = folder / f"witnesses_{file}.rows"
+            path = folder / f"sample_{file}.rows"
             heads.append(FileHead.from_json(head, layout, np.fromfile(path, layout.dtype)))
         return cls(
             folder,
@@ -330,6 +330,6 @@ def removed(folder: Path) -> None:
     if not folder.is_dir():
         return
     (folder / INDEX).unlink(missing_ok=True)
-    for pattern in ("tile_*.rows", "tile_*.npz", "tile_*.tmp", "witnesses_*.rows"):
+    for pattern in ("tile_*.rows", "tile_*.npz", "tile_*.tmp", "sample_*.rows"):
         for file in folder.glob(pattern):
             file.unlink()

@@ -27,8 +27,8 @@ from surfsig.tiles.source import Source
 FIRST_SHARE = 8
 """Of each chunk of a LAZ file, the first look decodes one part in so many: enough to see where points are."""
 
-_WITNESSES = 256
-"""Witnesses beyond which those of blocks are thinned to those of the file."""
+_SAMPLED_POINTS = 256
+"""Sample points beyond which those of blocks are thinned to those of the file."""
 
 
 @dataclass(frozen=True)
@@ -176,15 +176,15 @@ class SecondLook:
 
     def __init__(self, finish: Finish) -> None:
         self._finish = finish
-        self._witnesses: list[PointCloud] = []
+        self._sample: list[PointCloud] = []
         self._count = 0
         self._lowest, self._highest = np.full(3, np.inf), np.full(3, -np.inf)
 
     def add(self, cloud: PointCloud, points: NDArray[np.float64]) -> None:
         """Look at a block, and its true coordinates."""
-        self._witnesses.append(self._finish.witnesses_of(cloud))
-        if sum(map(len, self._witnesses)) > _WITNESSES:
-            self._witnesses = [self._finish.witnesses_of(stacked(self._witnesses))]
+        self._sample.append(self._finish.sample_of(cloud))
+        if sum(map(len, self._sample)) > _SAMPLED_POINTS:
+            self._sample = [self._finish.sample_of(stacked(self._sample))]
         self._count += len(cloud)
         finite = finite_rows(points)
         points = points if finite.all() else points[finite]
@@ -198,8 +198,8 @@ class SecondLook:
         """Add what was found to that of the files before."""
         found.lowest = np.minimum(found.lowest, self._lowest)
         found.highest = np.maximum(found.highest, self._highest)
-        witnesses = self._finish.witnesses_of(stacked(self._witnesses))
-        found.heads.append(FileHead(self._finish, witnesses, self._count))
+        sample = self._finish.sample_of(stacked(self._sample))
+        found.heads.append(FileHead(self._finish, sample, self._count))
 
 
 class LostFileError(Exception):
@@ -235,7 +235,7 @@ def warn_of_differences(survey: Survey) -> None:
     """Warn, as `surfsig.read`, of fields and viewpoints that not all files have."""
     if len(survey.heads) > 1:
         nobody = np.arange(0)
-        clouds = [head.finish.cloud(head.witnesses.at(nobody), head.witnesses) for head in survey.heads]
+        clouds = [head.finish.cloud(head.sample.at(nobody), head.sample) for head in survey.heads]
         joined(clouds, f"{survey.files[0]} and {len(survey.files) - 1} more")
 
 

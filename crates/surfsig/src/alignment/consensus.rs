@@ -127,7 +127,9 @@ impl Correspondences {
             if chosen.len() > rivals || (!chosen.is_empty() && is_weak) {
                 break;
             }
-            let is_distinct = |other: &RigidTransform| self.displacement(&tried[number], other) > distance;
+            let places = || self.pairs.iter().map(|pair| pair.source.into());
+            let is_distinct =
+                |other: &RigidTransform| tried[number].displacement_from(other, places()) > distance;
             if chosen.iter().all(is_distinct) {
                 chosen.push(self.refitted(tried[number]));
             }
@@ -138,14 +140,6 @@ impl Correspondences {
     /// The one that most matches agree with.
     pub fn agreed_transform(&self) -> RigidTransform {
         self.agreed_transforms(0, 1.0, 0.0).swap_remove(0)
-    }
-
-    /// The root mean square of the distances between the source's places after either transform.
-    fn displacement(&self, one: &RigidTransform, other: &RigidTransform) -> f64 {
-        let rotation = one.rotation - other.rotation;
-        let translation = one.translation - other.translation;
-        let square = |pair: &Pair| (rotation * pair.source + translation).norm_squared();
-        (self.pairs.iter().map(square).sum::<f64>() / self.pairs.len().max(1) as f64).sqrt()
     }
 
     fn refitted(&self, mut transform: RigidTransform) -> RigidTransform {

@@ -22,6 +22,7 @@ pub(crate) use clustered_covariance::{blocks, clustered_covariance};
 pub use consensus::ConsensusSettings;
 pub(crate) use consensus::Correspondences;
 pub(crate) use even_sample::even_sample;
+pub(crate) use explained::Explained;
 pub(crate) use gicp::gicp_with;
 pub use gicp::{GicpResult, GicpSettings, gicp};
 pub use gicp_cloud::GicpCloud;

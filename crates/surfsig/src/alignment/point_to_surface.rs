@@ -138,6 +138,10 @@ impl TargetSurface {
         Self { points, tree, voxel, goes_on }
     }
 
+    pub fn points(&self) -> &[[f64; 3]] {
+        &self.points
+    }
+
     /// Of one point; `None` where the target has no surface.
     fn residual(
         &self,

@@ -142,12 +142,7 @@ impl Rivals<'_> {
         })
     }
 
-    /// The root mean square of the distances between the source's points after either transform.
     fn displacement(&self, one: &RigidTransform, other: &RigidTransform) -> f64 {
-        let rotation = one.rotation - other.rotation;
-        let translation = one.translation - other.translation;
-        let square =
-            |point: &[f64; 3]| (rotation * nalgebra::Vector3::from(*point) + translation).norm_squared();
-        (self.source.iter().map(square).sum::<f64>() / self.source.len().max(1) as f64).sqrt()
+        one.displacement_from(other, self.source.iter().copied())
     }
 }

@@ -301,6 +301,23 @@ impl RigidTransform {
         [vector.x, vector.y, vector.z, velocity.x, velocity.y, velocity.z]
     }
 
+    /// The root mean square of the distances between points after this transform and after another; 0 of no points.
+    ///
+    /// ```
+    /// use surfsig::RigidTransform;
+    /// let shift = RigidTransform::from_rotation_vector([0.0; 3], [3.0, 4.0, 0.0]);
+    /// assert_eq!(shift.displacement_from(&RigidTransform::identity(), [[1.0; 3], [2.0; 3]]), 5.0);
+    /// ```
+    pub fn displacement_from(&self, other: &Self, points: impl IntoIterator<Item = [f64; 3]>) -> f64 {
+        let (rotation, translation) = (self.rotation - other.rotation, self.translation - other.translation);
+        let (mut sum, mut count) = (0.0, 0_usize);
+        for point in points {
+            sum += (rotation * Vector3::from(point) + translation).norm_squared();
+            count += 1;
+        }
+        (sum / count.max(1) as f64).sqrt()
+    }
+
     /// The matrix, row by row, that takes twists in the source's axes to the same motions in the target's:
     /// T exp(twist) T^-1 = exp(Ad twist).
     ///

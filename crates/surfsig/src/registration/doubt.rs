@@ -53,6 +53,26 @@ pub enum Doubt {
     },
 }
 
+impl Doubt {
+    /// Its name, for programs.
+    ///
+    /// ```
+    /// assert_eq!(surfsig::Doubt::Ambiguous { alternatives: 3 }.name(), "ambiguous");
+    /// ```
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::NotFound => "not_found",
+            Self::FewMatches { .. } => "few_matches",
+            Self::LittleOverlap { .. } => "little_overlap",
+            Self::FreeDirections { .. } => "free_directions",
+            Self::FreeSpace { .. } => "free_space",
+            Self::Ambiguous { .. } => "ambiguous",
+            Self::Mirrored { .. } => "mirrored",
+            Self::Scale { .. } => "scale",
+        }
+    }
+}
+
 impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let plural = |count: usize| if count == 1 { "" } else { "s" };
@@ -73,7 +93,8 @@ impl fmt::Display for Doubt {
                 100.0 * share
             ),
             Self::Ambiguous { alternatives } => {
-                write!(f, "{alternatives} other transform{} explain as much", plural(alternatives))
+                let verb = if alternatives == 1 { "explains" } else { "explain" };
+                write!(f, "{alternatives} other transform{} {verb} as much", plural(alternatives))
             }
             Self::Mirrored { inliers } => {
                 write!(f, "the source's mirror image fits better: {inliers} of its matches agree")

@@ -1,35 +1,32 @@
 //! What both sensors would have seen: points of one scan where the other's sensor looked through.
 
 use super::settings::FreeSpaceSettings;
-use crate::alignment::even_sample;
 use crate::geometry::RigidTransform;
 use crate::scan::CenteredScan;
-use crate::visibility::{RangeImageSettings, SphericalRangeImage, Visibility, all_seen_from};
+use crate::visibility::{RangeImageSettings, SphericalRangeImage, all_seen_from};
 
 /// What two sensors saw, as far as is known from where they saw all of their scans, and some points of both.
 pub(super) struct BothSensors<'a> {
     of_source: Option<SensorView>,
     of_target: Option<SensorView>,
     source: &'a [[f64; 3]],
-    target: Vec<[f64; 3]>,
+    target: &'a [[f64; 3]],
     settings: FreeSpaceSettings,
 }
 
 impl<'a> BothSensors<'a> {
-    /// Takes both scans, an even sample of the source, and the distance between its points.
+    /// Takes both scans, each with points that are spread evenly over it, and the distance between these.
     pub fn new(
-        source: &CenteredScan,
-        sample: &'a [[f64; 3]],
-        target: &CenteredScan,
+        [source, target]: [&CenteredScan; 2],
+        samples: [&'a [[f64; 3]]; 2],
         voxel: f64,
         settings: FreeSpaceSettings,
     ) -> Self {
-        let of_target = even_sample(&target.points, sample.len(), voxel);
         Self {
-            of_source: SensorView::new(source, sample, voxel, &settings),
-            of_target: SensorView::new(target, &of_target, voxel, &settings),
-            source: sample,
-            target: of_target,
+            of_source: SensorView::new(source, samples[0], voxel, &settings),
+            of_target: SensorView::new(target, samples[1], voxel, &settings),
+            source: samples[0],
+            target: samples[1],
             settings,
         }
     }
@@ -41,7 +38,7 @@ impl<'a> BothSensors<'a> {
         let share = |view: &Option<SensorView>, points: &[[f64; 3]], to_scan: &RigidTransform| {
             view.as_ref().map_or(f64::NAN, |view| view.free_space(points, to_scan, self.settings.min_points))
         };
-        let in_source = share(&self.of_source, &self.target, &T_target_source.inverse());
+        let in_source = share(&self.of_source, self.target, &T_target_source.inverse());
         let in_target = share(&self.of_target, self.source, T_target_source);
         // The larger one, or the one that is known.
         in_source.max(in_target)
@@ -75,13 +72,11 @@ impl SensorView {
 
     /// The share of points in free space, of those that the sensor would have measured; NaN where these are few.
     fn free_space(&self, points: &[[f64; 3]], to_scan: &RigidTransform, min_points: usize) -> f64 {
-        let (mut free, mut in_sight) = (0_usize, 0_usize);
-        for point in points {
+        let from_viewpoint = |point: &[f64; 3]| {
             let moved = to_scan.transform_point(*point);
-            let visibility = self.image.visibility(std::array::from_fn(|k| moved[k] - self.viewpoint[k]));
-            free += usize::from(visibility == Visibility::FreeSpace);
-            in_sight += usize::from(visibility.is_in_sight());
-        }
+            std::array::from_fn(|k| moved[k] - self.viewpoint[k])
+        };
+        let (free, in_sight) = self.image.free_space_counts(points.iter().map(from_viewpoint));
         if in_sight < min_points { f64::NAN } else { free as f64 / in_sight as f64 }
     }
 }

@@ -3,7 +3,7 @@
 use super::doubt::Doubt;
 use super::free_space::BothSensors;
 use super::settings::RegistrationSettings;
-use crate::alignment::{Alternative, FreeDirection, PointToSurface, Rivals, TargetSurface};
+use crate::alignment::{Alternative, Explained, FreeDirection, PointToSurface, Rivals, TargetSurface};
 use crate::geometry::RigidTransform;
 use crate::random::some_of;
 
@@ -81,7 +81,7 @@ impl Judge<'_> {
             scale: f64::NAN,
             scale_standard_error: f64::NAN,
         };
-        self.scale(&rivals, &mut judged);
+        self.scale(&rivals, &best, &mut judged);
         self.doubt(found, inliers, &mut judged);
         judged
     }
@@ -115,14 +115,14 @@ impl Judge<'_> {
     }
 
     /// Whether a source of another size fits better.
-    fn scale(&self, rivals: &Rivals<'_>, judged: &mut Judgement) {
+    fn scale(&self, rivals: &Rivals<'_>, best: &Explained, judged: &mut Judgement) {
         let moved = rivals.best.T_target_source.transform_points(rivals.source);
         let Some(found) = self.surface.scale_of(&moved, &self.settings.rival_fit) else { return };
         judged.scale = found.scale;
         judged.scale_standard_error = found.standard_error;
         let off = found.scale.ln().abs();
         let is_significant = off > self.settings.scale_deviations * found.standard_error / found.scale;
-        let deficit = rivals.explained().deficit_of(&rivals.closeness_of(&found.points));
+        let deficit = best.deficit_of(&rivals.closeness_of(&found.points));
         if is_significant
             && off > self.settings.doubted_scale
             && deficit.is_some_and(|(deficit, _)| deficit < 0.0)

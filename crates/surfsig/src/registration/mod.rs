@@ -121,20 +121,20 @@ fn registered(
     let refined = refined(ours, theirs, proposals[0], voxel, settings);
     monitor.add(1);
     monitor.check()?;
-    let Some(found) = surface.align(&sample, refined, &settings.point_to_surface) else {
+    let Some(mut found) = surface.align(&sample, refined, &settings.point_to_surface) else {
         return Ok(Registration::nothing(radius, count));
     };
     monitor.check()?;
     let judge = Judge {
         surface: &surface,
         sample: &sample,
-        sensors: BothSensors::new(source, &sample, target, voxel, settings.free_space),
+        sensors: BothSensors::new([source, target], [&sample, surface.points()], voxel, settings.free_space),
         radius,
         settings,
     };
     let inliers_of =
         |found: &PointToSurface| matches.as_ref().map(|matches| matches.inlier_count(&found.T_target_source));
-    let (mut found, mut inliers) = (found.clone(), inliers_of(&found));
+    let mut inliers = inliers_of(&found);
     let mut judged = judge.judged(&found, &proposals[1..], inliers);
     if let Some(better) =
         judged.better.and_then(|better| surface.align(&sample, better, &settings.point_to_surface))

@@ -2,7 +2,7 @@
 
 use super::graph::Graph;
 use super::likeness::Likeness;
-use super::sheets::{self, Sheets};
+use super::sheets;
 use super::surroundings::{Surroundings, around, is_line};
 use crate::fit::FitUsed;
 use crate::primitive::{Chart, Vector};
@@ -66,7 +66,7 @@ pub(super) struct Scene {
     /// Normals of the surfaces through the nearest points; not a number where there is none.
     pub normals: Vec<Vector>,
     /// Noise that somebody knows.
-    known: Option<f64>,
+    pub known: Option<f64>,
     /// Whether there is no noise, so that surfaces hold points on them and no others.
     pub is_exact: bool,
     /// Standard deviations of the nearest points from those surfaces; infinite where there is none.
@@ -74,7 +74,7 @@ pub(super) struct Scene {
     /// Whether they are known of the point's own sheet, of two that are near each other.
     pub is_on_sheet: Vec<bool>,
     /// Noise and normals that points on sheets had before.
-    before_sheets: Vec<(u32, f64, Vector)>,
+    pub before_sheets: Vec<(u32, f64, Vector)>,
     pub graph: Graph,
     /// Points among which surfaces grow, ascending: all, or one of each clump.
     pub chosen: Vec<u32>,
@@ -231,33 +231,6 @@ impl Scene {
         }
     }
 
-    /// Takes over the normal and the noise of a point's own sheet, of two that are farther apart than noise.
-    pub fn set_sheet(&mut self, point: u32, sheets: &Sheets) {
-        let noise = self.known.unwrap_or(sheets.noise);
-        if sheets.are_apart(noise) && (!self.is_exact || self.is_noiseless(noise)) {
-            let index = point as usize;
-            self.before_sheets.push((point, self.noise[index], self.normals[index]));
-            self.noise[index] = noise;
-            self.normals[index] = sheets.normal;
-            self.is_on_sheet[index] = true;
-        }
-    }
-
-    /// Takes sheets for one surface again, and nothing as learnt; tells whether there were any.
-    pub fn forget_sheets(&mut self) -> bool {
-        let before = std::mem::take(&mut self.before_sheets);
-        for &(point, noise, normal) in &before {
-            let index = point as usize;
-            self.noise[index] = noise;
-            self.normals[index] = normal;
-            self.is_on_sheet[index] = false;
-        }
-        if !before.is_empty() {
-            (self.likeness, self.common_noise) = (Likeness::NONE, f64::INFINITY);
-        }
-        !before.is_empty()
-    }
-
     /// At most so many unlabelled points from which surfaces grow, those with the least noise first.
     pub fn seeds(&self, most: usize) -> Vec<u32> {
         let is_seed = |&point: &u32| {
@@ -268,19 +241,6 @@ impl Scene {
         let mut seeds: Vec<u32> = left.step_by(self.chosen.len().div_ceil(most)).collect();
         seeds.sort_by(|&a, &b| self.noise[a as usize].total_cmp(&self.noise[b as usize]));
         seeds
-    }
-
-    /// So many unlabelled points around a seed from which a surface begins, of its own sheet only where there are two.
-    pub fn first_around(&self, seed: u32, most: usize, seen: &mut Stamps) -> Vec<u32> {
-        let index = seed as usize;
-        if !self.is_on_sheet[index] {
-            return self.around(seed, most, seen);
-        }
-        let of_both = self.around(seed, 2 * most, seen);
-        let from =
-            |&point: &u32| (self.points[point as usize] - self.points[index]).dot(&self.normals[index]);
-        let reach = sheets::REACH * self.noise[index] + self.floor;
-        of_both.into_iter().filter(|point| from(point).abs() <= reach).collect()
     }
 
     /// The first unlabelled points that are found from one on, over neighbours: at most so many.

@@ -4,6 +4,7 @@
 //! Such points are on two parallel planes. Where these are told apart, each point's noise and normal are those of its own
 //! sheet.
 
+use super::likeness::Likeness;
 use super::scene::{Scene, Stamps};
 use crate::primitive::{Vector, smallest};
 use nalgebra::Matrix3;
@@ -21,7 +22,7 @@ const APART: f64 = 5.0;
 
 /// Distance from a point along its normal, in units of noise, up to which others are on its
 /// sheet: half of what tells sheets apart.
-pub(super) const REACH: f64 = 2.5;
+const REACH: f64 = 2.5;
 
 /// Distance of the groups' means along the planes, in units of the points' spread there, up to which the sheets lie over each
 /// other. The groups of a step, which lie side by side, are 1.5 apart, those of two sheets of 20 points each 0.3.
@@ -78,6 +79,48 @@ pub(super) fn tell_apart(scene: &mut Scene) {
         if 2 * alike >= all {
             scene.set_sheet(*point, sheets);
         }
+    }
+}
+
+impl Scene {
+    /// Takes over the normal and the noise of a point's own sheet, of two that are farther apart than noise.
+    pub fn set_sheet(&mut self, point: u32, sheets: &Sheets) {
+        let noise = self.known.unwrap_or(sheets.noise);
+        if sheets.are_apart(noise) && (!self.is_exact || self.is_noiseless(noise)) {
+            let index = point as usize;
+            self.before_sheets.push((point, self.noise[index], self.normals[index]));
+            self.noise[index] = noise;
+            self.normals[index] = sheets.normal;
+            self.is_on_sheet[index] = true;
+        }
+    }
+
+    /// Takes sheets for one surface again, and nothing as learnt; tells whether there were any.
+    pub fn forget_sheets(&mut self) -> bool {
+        let before = std::mem::take(&mut self.before_sheets);
+        for &(point, noise, normal) in &before {
+            let index = point as usize;
+            self.noise[index] = noise;
+            self.normals[index] = normal;
+            self.is_on_sheet[index] = false;
+        }
+        if !before.is_empty() {
+            (self.likeness, self.common_noise) = (Likeness::NONE, f64::INFINITY);
+        }
+        !before.is_empty()
+    }
+
+    /// So many unlabelled points around a seed from which a surface begins, of its own sheet only where there are two.
+    pub fn first_around(&self, seed: u32, most: usize, seen: &mut Stamps) -> Vec<u32> {
+        let index = seed as usize;
+        if !self.is_on_sheet[index] {
+            return self.around(seed, most, seen);
+        }
+        let of_both = self.around(seed, 2 * most, seen);
+        let from =
+            |&point: &u32| (self.points[point as usize] - self.points[index]).dot(&self.normals[index]);
+        let reach = REACH * self.noise[index] + self.floor;
+        of_both.into_iter().filter(|point| from(point).abs() <= reach).collect()
     }
 }
 

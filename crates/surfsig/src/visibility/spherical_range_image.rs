@@ -159,13 +159,19 @@ impl SphericalRangeImage {
     /// assert_eq!(share, 0.5);
     /// ```
     pub fn free_space_share(&self, points: impl IntoIterator<Item = [f64; 3]>) -> f64 {
-        let (mut free, mut in_sight) = (0_usize, 0_usize);
+        let (free, in_sight) = self.free_space_counts(points);
+        free as f64 / in_sight.max(1) as f64
+    }
+
+    /// How many points are in free space, and how many the sensor would have measured.
+    pub(crate) fn free_space_counts(&self, points: impl IntoIterator<Item = [f64; 3]>) -> (usize, usize) {
+        let (mut free, mut in_sight) = (0, 0);
         for point in points {
             let visibility = self.visibility(point);
             free += usize::from(visibility == Visibility::FreeSpace);
             in_sight += usize::from(visibility.is_in_sight());
         }
-        free as f64 / in_sight.max(1) as f64
+        (free, in_sight)
     }
 }
 
