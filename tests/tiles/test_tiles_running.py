@@ -51,6 +51,17 @@ def test_the_manifest_says_how_and_what(paths: list[Path], tmp_path: Path) -> No
         assert sum(record["status"].values()) == record["points"]
 
 
+def test_what_a_killed_process_had_begun_to_write_is_removed(paths: list[Path], tmp_path: Path) -> None:
+    found = run(paths, tmp_path / "out")
+    assert found.status_counts() == surfsig.TileDataset(tmp_path / "out").status_counts()
+    assert sum(found.status_counts().values()) == 4000
+    left = [tmp_path / "out" / ".tile_000000.laz.0123.tmp", tmp_path / "out/records/.000000.json.45.tmp"]
+    for file in left:
+        file.write_bytes(b"half")
+    run(paths, tmp_path / "out")
+    assert not any(file.exists() for file in left)
+
+
 def test_a_run_that_was_stopped_goes_on(
     paths: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -38,6 +38,7 @@ from surfsig.tiles.manifest import (
     cleared,
     finished_records,
     read_manifest,
+    remove_unfinished,
     write_manifest,
 )
 from surfsig.tiles.memory import memory_bytes, points_per_tile
@@ -241,6 +242,7 @@ class _Job:
             "boxes": [[_finite(corner) for corner in box] for box in store.plan.boxes.tolist()],
         }
         self._work(task, records, values, cluster)
+        remove_unfinished(self._out)
         failed = [record for record in records.values() if "error" in record]
         if failed:
             first = failed[0]

@@ -132,6 +132,13 @@ def finished_records(out: Path, tiles: Iterable[int]) -> dict[int, Record]:
     return found
 
 
+def remove_unfinished(out: Path) -> None:
+    """Remove what a killed process had begun to write, once all tiles are done."""
+    for folder, pattern in ((out, ".tile_*.tmp"), (out / RECORDS, ".*.tmp")):
+        for file in folder.glob(pattern):
+            file.unlink(missing_ok=True)
+
+
 def cleared(out: Path) -> None:
     """Remove the parts, records and the manifest of a run, and nothing else."""
     manifest = read_manifest(out)
