@@ -63,7 +63,7 @@ def test_neighbours_err_alike() -> None:
     assert len(found) <= 6
 
 
-@pytest.mark.parametrize(("step", "jitter"), [(0.003, 0.3), (0.001, 0.0)])
+@pytest.mark.parametrize(("step", "jitter"), [(0.003, 0.3), (0.001, 0.3), (0.0009, 0.0), (0.0014, 0.0)])
 def test_a_sensor_that_measures_in_steps(step: float, jitter: float) -> None:
     """As the first Kinect's depths do, in steps of 3 mm at one metre: no step is a surface."""
     rng = np.random.default_rng(SEED)
@@ -72,6 +72,24 @@ def test_a_sensor_that_measures_in_steps(step: float, jitter: float) -> None:
     found = surfsig.find_surfaces((rays * stepped[..., None]).reshape(-1, 3))
     check(found, owner.ravel(), share=0.9, precision=0.03)
     assert len(found) <= 6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [0.0008, 0.001, 0.0012, 0.0017])
+def test_no_step_is_a_surface(step: float) -> None:
+    """Nor where there is no noise but steps: two of them are a quadric, so that this looked like an exact model.
+
+    The wall and the ball are found; the pipe, along whose columns of pixels depth is the same, may be in pieces.
+    """
+    rays, depth, owner = camera()
+    stepped = 1 / (np.round(1 / depth / step) * step)
+    found = surfsig.find_surfaces((rays * stepped[..., None]).reshape(-1, 3))
+    assert len(found) <= 12
+    for number, kind in ((WALL, "plane"), (BALL, "sphere")):
+        labels = found.labels[owner.ravel() == number]
+        best = np.bincount(labels[labels >= 0]).argmax()
+        assert found.surfaces[best].kind == kind
+        assert (labels == best).mean() > 0.9
 
 
 def test_points_that_were_seen_many_times() -> None:

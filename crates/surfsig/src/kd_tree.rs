@@ -15,6 +15,17 @@ struct Split {
     value: f64,
 }
 
+/// Factor beyond what the sum of two distances can lose in float64.
+const ROUNDING: f64 = 1.0 + 1e-12;
+
+/// The distance from a point to the farthest of so many nearest ones.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Farthest<const N: usize> {
+    point: [f64; N],
+    count: usize,
+    distance: f64,
+}
+
 /// Points of `N` coordinates, three unless said otherwise, sorted for searches of nearest neighbours. Of equally near
 /// ones the first in the caller's order counts.
 ///
@@ -100,6 +111,17 @@ impl<const N: usize> KdTree<N> {
         &self.indices
     }
 
+    /// Numbers the points in the order of the leaves from now on; returns the numbers that they had, in this order.
+    pub(crate) fn renumber(&mut self) -> Vec<u32> {
+        let leaves = 0..self.indices.len() as u32;
+        std::mem::replace(&mut self.indices, leaves.collect())
+    }
+
+    /// The points in the order of the leaves.
+    pub(crate) fn points(&self) -> &[[f64; N]] {
+        &self.points
+    }
+
     /// The number of the nearest point within `reach`, and its squared distance.
     ///
     /// ```
@@ -179,6 +201,24 @@ impl<const N: usize> KdTree<N> {
             },
             &mut { farthest },
         );
+    }
+
+    /// The same as [`nearest_k`](Self::nearest_k), for searches one after the other at points that are near to each other:
+    /// the nearest points of the one before are no farther than their own distance and the way between the two.
+    pub(crate) fn nearest_k_after(
+        &self,
+        previous: &mut Option<Farthest<N>>,
+        point: [f64; N],
+        count: usize,
+        found: &mut Vec<(f64, u32)>,
+    ) {
+        let between = |other: &[f64; N]| squared_distance(other, &point).sqrt();
+        let reach = previous.as_ref().filter(|last| last.count >= count);
+        let reach = reach.map_or(f64::INFINITY, |last| (last.distance + between(&last.point)) * ROUNDING);
+        self.nearest_k_within(point, count, reach, found);
+        // Fewer are all that there are.
+        let last = found.last().filter(|_| found.len() == count);
+        *previous = last.map(|&(square, _)| Farthest { point, count, distance: square.sqrt() });
     }
 
     /// Numbers of all points within a distance, in ascending order. `found` is overwritten.
@@ -316,6 +356,11 @@ mod tests {
                 prop_assert_eq!(&nearest, &expected[..inside.len().min(7)]);
             }
             let mut found = Vec::new();
+            let mut previous = None;
+            for (number, &from) in points.iter().take(30).enumerate() {
+                tree.nearest_k_after(&mut previous, from, 3 + number / 10, &mut found);
+                prop_assert_eq!(&found, &slow(&points, from)[..points.len().min(3 + number / 10)]);
+            }
             for count in [0, 1, 7, 400] {
                 tree.nearest_k(at, count, &mut found);
                 prop_assert_eq!(&found, &expected[..count.min(expected.len())]);

@@ -34,9 +34,10 @@ pub fn mean_neighbor_distances(
         // In the order of the leaves, searches one after the other find their part of the tree in the cache.
         let of_part = |found: &mut Vec<(f64, u32)>, part: &[u32]| {
             monitor.check()?;
+            let mut previous = None;
             let mean = |&index: &u32| {
                 // The nearest of all is the point itself, or one in the same place.
-                tree.nearest_k(points[index as usize], count + 1, found);
+                tree.nearest_k_after(&mut previous, points[index as usize], count + 1, found);
                 let others = found.len().saturating_sub(1).max(1) as f64;
                 (index, found.iter().skip(1).map(|(square, _)| square.sqrt()).sum::<f64>() / others)
             };

@@ -4,7 +4,8 @@
 //! them. Without noise three of its points are enough: others lie in their plane by chance hardly ever.
 
 use super::growth::{Grower, Region};
-use super::scene::{Scene, Stamps};
+use super::scene::Scene;
+use super::stamps::Stamps;
 use crate::primitive::{Primitive, SurfaceKind, Vector};
 
 /// Points around a seed, the nearest first, two of which are taken with it, ...

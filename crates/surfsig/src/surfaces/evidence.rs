@@ -4,7 +4,8 @@
 //! A surface of its own ends at edges: the next points are far from it or lie across it, or there are none.
 
 use super::growth::{ALONG, Region};
-use super::scene::{Scene, Stamps};
+use super::scene::Scene;
+use super::stamps::Stamps;
 
 /// Fewer points are no surface, unless somebody says so.
 pub const FEWEST_SURFACE_POINTS: usize = 20;

@@ -1,18 +1,9 @@
 //! Which points are next to each other.
 
-use crate::ball::{BallVisitor, DirectWalk};
-use crate::cell_index::CellIndex;
-use crate::simd::InstructionSet;
-use crate::simd::select::Block;
-use crate::{Error, Monitor, Radius};
-use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Points that are neighbours of each point.
 pub(super) const NEIGHBOURS: usize = 12;
-
-/// Times that the ball is doubled for points that have too few neighbours in it.
-const DOUBLINGS: usize = 5;
 
 /// No neighbour.
 pub(super) const NOBODY: u32 = u32::MAX;
@@ -24,104 +15,32 @@ pub(super) struct Graph {
     pub nearest: Vec<f32>,
 }
 
-/// A point, and its neighbours: the square of each distance, and its rank.
-type Near = (u32, Vec<(f32, u32)>);
+/// The neighbours of one point, the nearest first, and the distance to the first.
+pub(super) struct Neighbours {
+    points: [u32; NEIGHBOURS],
+    nearest: f32,
+}
 
-/// Remembers the members of a ball by their distance.
-#[derive(Default)]
-struct Nearest(Vec<(f32, u32)>);
-
-impl BallVisitor for Nearest {
-    const WANTS_RANKS: bool = true;
-
-    fn visit(&mut self, block: &Block, len: usize) {
-        let square = |i: usize| block.x[i] * block.x[i] + block.y[i] * block.y[i] + block.z[i] * block.z[i];
-        self.0.extend((0..len).map(|i| (square(i), block.rank[i])));
+impl Neighbours {
+    /// Every n-th of the nearest points of one, which may itself be among them.
+    pub fn of(point: u32, nearest: &[(f64, u32)], stride: usize) -> Self {
+        let mut points = [NOBODY; NEIGHBOURS];
+        let others = || nearest.iter().filter(|&&(_, other)| other != point);
+        points.iter_mut().zip(others().step_by(stride)).for_each(|(slot, &(_, other))| *slot = other);
+        Self { points, nearest: others().next().map_or(f32::INFINITY, |(square, _)| square.sqrt() as f32) }
     }
 }
 
 impl Graph {
-    /// Of points within a radius that holds enough for most. A point with a stride has every n-th of its nearest
-    /// points for neighbours.
-    pub fn new(
-        positions: &[[f64; 3]],
-        strides: &[u8],
-        radius: Radius,
-        monitor: &Monitor,
-    ) -> Result<Self, Error> {
-        let mut graph = Self {
-            neighbours: vec![[NOBODY; NEIGHBOURS]; positions.len()],
-            nearest: vec![f32::INFINITY; positions.len()],
-        };
-        let mut left: Vec<u32> = (0..positions.len() as u32).collect();
-        let mut size = radius.get();
-        for _ in 0..=DOUBLINGS {
-            let radius = Radius::new(size)?;
-            let index = CellIndex::of_positions(positions.len(), |i| Some(positions[i]), radius, monitor)?;
-            let wanted = NEIGHBOURS.min(index.len().saturating_sub(1));
-            // Those that are not asked for have no stride.
-            let mut asked = vec![0; positions.len()];
-            left.iter().for_each(|&i| asked[i as usize] = strides[i as usize]);
-            graph.fill(&index, &asked, size as f32, monitor)?;
-            left.retain(|&i| wanted > 0 && graph.neighbours[i as usize][wanted - 1] == NOBODY);
-            if left.is_empty() {
-                break;
-            }
-            size *= 2.0;
-        }
-        Ok(graph)
+    /// Of so many points without neighbours.
+    pub fn unconnected(count: usize) -> Self {
+        Self { neighbours: vec![[NOBODY; NEIGHBOURS]; count], nearest: vec![f32::INFINITY; count] }
     }
 
-    /// Looks through the balls of the points that are asked for.
-    fn fill(&mut self, index: &CellIndex, asked: &[u8], size: f32, monitor: &Monitor) -> Result<(), Error> {
-        let set = InstructionSet::detect();
-        let rows: Vec<Vec<Near>> = index
-            .rows
-            .par_chunks(16)
-            .map_init(
-                || (DirectWalk::new(index, set), Nearest::default()),
-                |(walk, nearest), rows| {
-                    monitor.check()?;
-                    let mut found = Vec::new();
-                    for row in rows {
-                        for rank in row.start..row.end {
-                            let point = index.point_of_rank[rank];
-                            let stride = usize::from(asked[point as usize]);
-                            if stride == 0 {
-                                continue;
-                            }
-                            let most = NEIGHBOURS * stride;
-                            let offset = [index.x[rank], index.y[rank], index.z[rank]];
-                            walk.enter_row(row.key);
-                            walk.enter_run(offset, offset);
-                            nearest.0.clear();
-                            walk.visit(offset, nearest);
-                            let members = &mut nearest.0;
-                            members.retain(|&(_, other)| other as usize != rank);
-                            let order =
-                                |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-                            if members.len() > most {
-                                members.select_nth_unstable_by(most - 1, order);
-                                members.truncate(most);
-                            }
-                            members.sort_unstable_by(order);
-                            found.push((point, members.iter().copied().step_by(stride).collect()));
-                        }
-                    }
-                    Ok(found)
-                },
-            )
-            .collect::<Result<_, Error>>()?;
-        for (point, members) in rows.into_iter().flatten() {
-            let point = point as usize;
-            for (slot, (_, rank)) in self.neighbours[point].iter_mut().zip(&members) {
-                *slot = index.point_of_rank[*rank as usize];
-            }
-            if let Some((square, _)) = members.first() {
-                self.nearest[point] = size * square.sqrt();
-            }
-        }
-        Ok(())
+    /// Gives a point its neighbours.
+    pub fn connect(&mut self, point: u32, neighbours: Neighbours) {
+        self.neighbours[point as usize] = neighbours.points;
+        self.nearest[point as usize] = neighbours.nearest;
     }
 
     /// The graph of all points, if this is that of some, one in each voxel: the others' only neighbour is that one.

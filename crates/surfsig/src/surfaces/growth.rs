@@ -1,7 +1,8 @@
 //! A surface that grows over its neighbours.
 
 use super::evidence::Evidence;
-use super::scene::{Scene, Stamps};
+use super::scene::Scene;
+use super::stamps::Stamps;
 use crate::primitive::{
     EXACT, Primitive, QUICK, SurfaceKind, Termination, Vector, bent, extent, refine, start,
 };

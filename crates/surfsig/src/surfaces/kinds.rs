@@ -6,7 +6,8 @@
 
 use super::evidence::Evidence;
 use super::growth::{Grower, Region};
-use super::scene::{LOCAL, NONE, Scene, Stamps};
+use super::scene::{LOCAL, NONE, Scene};
+use super::stamps::Stamps;
 use crate::fit_primitive;
 use crate::primitive::{Chart, Primitive, SurfaceKind, Vector, bent, extent, refine, start};
 use rayon::prelude::*;

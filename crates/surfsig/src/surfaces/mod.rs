@@ -12,11 +12,13 @@ mod graph;
 mod growth;
 mod kinds;
 mod likeness;
+mod local_fits;
 mod measurement;
 mod merging;
 mod pieces;
 mod scene;
 mod sheets;
+mod stamps;
 mod surroundings;
 mod unexplained;
 
@@ -24,7 +26,8 @@ use crate::primitive::SurfaceKind;
 use crate::{Error, Monitor, PointCloud, with_threads};
 use evidence::Evidence;
 use growth::{Grower, Region};
-use scene::{LOCAL, NONE, Scene, Stamps};
+use scene::{LOCAL, NONE, Scene};
+use stamps::Stamps;
 
 pub use evidence::FEWEST_SURFACE_POINTS;
 

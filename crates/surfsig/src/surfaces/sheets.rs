@@ -5,7 +5,8 @@
 //! sheet.
 
 use super::likeness::Likeness;
-use super::scene::{Scene, Stamps};
+use super::scene::Scene;
+use super::stamps::Stamps;
 use crate::primitive::{Vector, smallest};
 use nalgebra::Matrix3;
 use rustc_hash::FxHashMap;
@@ -26,7 +27,7 @@ const REACH: f64 = 2.5;
 
 /// Distance of the groups' means along the planes, in units of the points' spread there, up to which the sheets lie over each
 /// other. The groups of a step, which lie side by side, are 1.5 apart, those of two sheets of 20 points each 0.3.
-const OVERLAP: f64 = 0.8;
+pub(super) const OVERLAP: f64 = 0.8;
 
 /// Times that points are shared out between two planes and these fitted.
 const ROUNDS: usize = 3;

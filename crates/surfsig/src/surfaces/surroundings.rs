@@ -1,23 +1,20 @@
 //! What is around each point: its neighbours, and the surface through its nearest points.
 
-use super::graph::{Graph, NEIGHBOURS};
-use crate::extract::extract_within;
-use crate::fit::FitKind;
+use super::graph::{Graph, NEIGHBOURS, Neighbours};
+use super::local_fits::{LocalFit, fit_nearest};
+use crate::kd_tree::KdTree;
 use crate::statistics::upper_median;
-use crate::{Error, ExtractOptions, Extraction, Monitor, Neighborhood, PointCloud, Queries, Radius};
+use crate::{Error, Monitor};
 
 /// Linearity of the nearest points below which they extend to all sides alike.
-const EVEN: f64 = 0.5;
+const EVEN: f32 = 0.5;
 
-/// Linearity of the nearest points from which they are a scanner's line, ...
-const LINE: f64 = 0.9;
-
-/// ... and so many times as many points are looked at.
-const ACROSS: u8 = 5;
+/// So many times as many points are looked at on a scanner's line.
+const ACROSS: usize = 5;
 
 /// What is around each of some points.
 pub(super) struct Surroundings {
-    pub local: Extraction,
+    pub fits: Vec<LocalFit>,
     pub graph: Graph,
     /// Typical distance to the last of the nearest points.
     pub typical: f64,
@@ -29,42 +26,62 @@ pub(super) struct Surroundings {
 
 impl Surroundings {
     /// `None` where there are too few points, or all are one.
-    pub fn new(positions: &[[f64; 3]], neighbours: usize, monitor: &Monitor) -> Result<Option<Self>, Error> {
+    pub fn new(
+        tree: &KdTree,
+        positions: &[[f64; 3]],
+        neighbours: usize,
+        monitor: &Monitor,
+    ) -> Result<Option<Self>, Error> {
         if positions.len() <= NEIGHBOURS.max(neighbours) {
             return Ok(None);
         }
-        let cloud = PointCloud::new_f64(positions);
-        let mut local = around(&cloud, neighbours, &Queries::All, &monitor.apart())?;
-        // On a line of a lidar the nearest points tell nothing across it.
-        let on_lines: Vec<u32> =
-            (0..positions.len() as u32).filter(|&i| is_line(&local, i as usize)).collect();
-        let is_even = local.linearity.iter().map(|&linearity| f64::from(linearity) < EVEN).collect();
-        let wider =
-            around(&cloud, neighbours * usize::from(ACROSS), &Queries::Indices(&on_lines), &monitor.apart())?;
-        local.take_over(on_lines.iter().map(|&i| i as usize).zip(0..), &wider);
-        let mut strides = vec![1_u8; positions.len()];
-        on_lines.iter().for_each(|&i| strides[i as usize] = ACROSS);
-        let typical = upper_median(local.radii.iter().map(|&r| f64::from(r)).filter(|r| *r > 0.0).collect());
+        let mut graph = Graph::unconnected(positions.len());
+        let mut fits = vec![LocalFit::MISSING; positions.len()];
+        let mut look = |fits: &mut [LocalFit], stride: usize, is_asked: &(dyn Fn(u32) -> bool + Sync)| {
+            // One more, for the point itself is among them.
+            let fewest = NEIGHBOURS * stride + 1;
+            let take = |point: u32, nearest: &[(f64, u32)]| Neighbours::of(point, nearest, stride);
+            let found = fit_nearest(tree, positions, &is_asked, neighbours * stride, fewest, &take, monitor)?;
+            for (point, fit, neighbours) in found.into_iter().flatten() {
+                fits[point as usize] = fit;
+                graph.connect(point, neighbours);
+            }
+            Ok::<(), Error>(())
+        };
+        look(&mut fits, 1, &|_| true)?;
+        let is_even = fits.iter().map(|fit| fit.linearity < EVEN).collect();
+        // On a line of a lidar the nearest points tell nothing across it, and every n-th of them is a neighbour.
+        let is_on_line: Vec<bool> = fits.iter().map(LocalFit::is_line).collect();
+        if is_on_line.contains(&true) {
+            look(&mut fits, ACROSS, &|point| is_on_line[point as usize])?;
+        }
+        let typical =
+            upper_median(fits.iter().map(|fit| f64::from(fit.radius)).filter(|r| *r > 0.0).collect());
         let Some(typical) = typical else { return Ok(None) };
-        let graph = Graph::new(positions, &strides, Radius::new(typical)?, monitor)?;
-        let spacing =
-            upper_median(graph.nearest.iter().map(|&d| f64::from(d)).filter(|d| d.is_finite()).collect());
-        Ok(Some(Self { local, graph, typical, spacing: spacing.unwrap_or(0.0), is_even }))
+        let spacing = graph.nearest.iter().map(|&d| f64::from(d)).filter(|d| d.is_finite()).collect();
+        let spacing = upper_median(spacing).unwrap_or(0.0);
+        Ok(Some(Self { fits, graph, typical, spacing, is_even }))
     }
 }
 
-/// Surfaces through so many nearest points; quadrics, for a paraboloid's bias would seem to be noise.
-pub(super) fn around(
-    cloud: &PointCloud<'_>,
+/// Surfaces through so many nearest points of some points, ascending.
+pub(super) fn fits_at(
+    positions: &[[f64; 3]],
+    some: &[u32],
     neighbours: usize,
-    queries: &Queries<'_>,
     monitor: &Monitor,
-) -> Result<Extraction, Error> {
-    let options = ExtractOptions { fit: FitKind::Quadric, ..Default::default() };
-    extract_within(cloud, Neighborhood::Nearest(neighbours), queries, &options, monitor)
-}
-
-/// Whether a point's nearest ones are a scanner's line.
-pub(super) fn is_line(local: &Extraction, entry: usize) -> bool {
-    f64::from(local.linearity[entry]) > LINE
+) -> Result<Vec<LocalFit>, Error> {
+    if some.is_empty() {
+        return Ok(Vec::new());
+    }
+    let tree = KdTree::new(positions);
+    let mut is_asked = vec![false; positions.len()];
+    some.iter().for_each(|&point| is_asked[point as usize] = true);
+    let is_asked = |point: u32| is_asked[point as usize];
+    let found = fit_nearest(&tree, positions, &is_asked, neighbours, 0, &|_, _| (), monitor)?;
+    let mut fits = vec![LocalFit::MISSING; some.len()];
+    for (point, fit, ()) in found.into_iter().flatten() {
+        fits[some.partition_point(|&other| other < point)] = fit;
+    }
+    Ok(fits)
 }

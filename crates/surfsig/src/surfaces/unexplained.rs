@@ -6,7 +6,8 @@
 
 use super::evidence::Evidence;
 use super::growth::{Grower, Region};
-use super::scene::{FEW_LOCAL, LOCAL, NONE, Scene, Stamps};
+use super::scene::{FEW_LOCAL, LOCAL, NONE, Scene};
+use super::stamps::Stamps;
 use crate::primitive::SurfaceKind;
 use crate::{Error, Monitor};
 
