@@ -7,6 +7,7 @@
 use super::InstructionSet;
 use super::instruction_set::Kind;
 use crate::lattice::Lattice;
+use crate::multiply_add::MultiplyAdd;
 
 /// The ball is d^2 <= r^2 (1 + 1e-5), in units of r: float32 offsets cannot decide a tie, and on a
 /// regular grid many points lie exactly on the sphere.
@@ -191,12 +192,12 @@ fn select_baseline<const RANKS: bool>(
     const WIDTH: usize = 8;
     let Placement { scale, shift } = placement;
     for start in ranks.clone().step_by(WIDTH) {
-        let lane = |row: &[f32], l: usize, axis: usize| row[start + l].mul_add(scale, shift[axis]);
+        let lane = |row: &[f32], l: usize, axis: usize| row[start + l].times_plus(scale, shift[axis]);
         let x: [f32; WIDTH] = std::array::from_fn(|l| lane(rows.x, l, 0));
         let y: [f32; WIDTH] = std::array::from_fn(|l| lane(rows.y, l, 1));
         let z: [f32; WIDTH] = std::array::from_fn(|l| lane(rows.z, l, 2));
         let inside: [bool; WIDTH] = std::array::from_fn(|l| {
-            let square = z[l].mul_add(z[l], y[l].mul_add(y[l], x[l] * x[l]));
+            let square = z[l].times_plus(z[l], y[l].times_plus(y[l], x[l] * x[l]));
             square <= BALL_LIMIT && start + l < ranks.end
         });
         for l in 0..WIDTH {
@@ -387,9 +388,9 @@ mod tests {
                 let ranks: Vec<usize> = block.rank[..block.len].iter().map(|&k| k as usize).collect();
                 assert_eq!(ranks, expected, "{} {len}", set.name());
                 for (slot, &i) in expected.iter().enumerate() {
-                    assert_eq!(block.x[slot], x[i].mul_add(0.7, 0.1));
-                    assert_eq!(block.y[slot], y[i].mul_add(0.7, -0.2));
-                    assert_eq!(block.z[slot], z[i].mul_add(0.7, 0.05));
+                    assert_eq!(block.x[slot], x[i].times_plus(0.7, 0.1));
+                    assert_eq!(block.y[slot], y[i].times_plus(0.7, -0.2));
+                    assert_eq!(block.z[slot], z[i].times_plus(0.7, 0.05));
                 }
             }
         }
