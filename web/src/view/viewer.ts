@@ -135,9 +135,14 @@ export class Viewer {
     this.scene.add(object);
   }
 
-  /** Diameter of a point where it is large, in the cloud's unit, and how much larger it is drawn. */
-  setPointSize(diameter: number, factor = this.sizeFactor): void {
+  /** Diameter of a point where it is large, in the cloud's unit. */
+  setPointSize(diameter: number): void {
     this.diameter = diameter;
+    this.render();
+  }
+
+  /** Draws points larger or smaller by a factor. */
+  scalePoints(factor: number): void {
     this.sizeFactor = factor;
     this.render();
   }
