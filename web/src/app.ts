@@ -19,6 +19,9 @@ import { PointLayer } from "./view/points.js";
 import { drawnTrajectory } from "./view/trajectory.js";
 import { Viewer } from "./view/viewer.js";
 
+/** Diameter of a drawn point, in spacings, with which surfaces look closed. */
+const CLOSED = 3.8;
+
 /** Points up to which curvature is computed as soon as a file is there. */
 const MOST_AT_ONCE = 1_500_000;
 
@@ -85,6 +88,7 @@ export class Application implements Actions {
     this.begin(layerOf(cloud));
     const { state, viewer } = this;
     Object.assign(state, { sample, format: sample === null ? cloud.format : "", leftOut: cloud.left_out, unit: unitOf(cloud, sample) });
+    this.update();
     viewer.fit();
     this.setQuantity(cloud.colours === null ? "height" : "file");
     const generation = this.generation;
@@ -94,9 +98,10 @@ export class Application implements Actions {
       if (generation !== this.generation) return;
       state.spacing = spacing;
       const extent = this.drawn?.box.getSize(viewer.camera.position.clone()).length() ?? 0;
-      viewer.setPointSize(1.6 * Math.max(spacing, 1e-4 * extent));
+      viewer.setPointSize(CLOSED * Math.max(spacing, 1e-4 * extent));
       this.follow(this.linked);
-      if (state.radius <= 0) state.radius = suggestedRadius(spacing);
+      const own = SAMPLES.find(({ id }) => id === sample)?.radius;
+      if (state.radius <= 0) state.radius = own ?? suggestedRadius(spacing);
     });
     if (generation !== this.generation || state.spacing <= 0) return;
     if (cloud.count <= MOST_AT_ONCE) await this.compute();
@@ -128,6 +133,7 @@ export class Application implements Actions {
     const format = kept < total ? `report, ${kept.toLocaleString("en")} of ${total.toLocaleString("en")} points` : "report";
     Object.assign(this.state, initialState(), { layer: first ?? null, format, unit: report.unit });
     this.frame.addReport(report, (share) => this.painter.setStage(share));
+    this.update();
     this.painter.setStage(1);
     this.viewer.fit();
     if (this.drawn !== null) {

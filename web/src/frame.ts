@@ -82,6 +82,7 @@ export function frame(root: HTMLElement, state: State, actions: Actions): Frame 
   const view = h("main", { id: "stage-area" }, canvas, legend.element, drawnText, ...marks, progress, message, start, chooser);
   root.replaceChildren(view, aside, help);
   legend.element.hidden = true;
+  message.hidden = true;
   let viewer: Viewer | null = null;
   let inReport = false;
 

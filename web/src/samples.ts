@@ -6,6 +6,8 @@ export interface Sample {
   id: string;
   title: string;
   told: string;
+  /** Of the neighbourhood, in metres, at which its shapes are seen well. */
+  radius: number;
   make(): CloudData;
 }
 
@@ -144,7 +146,7 @@ function waves(): CloudData {
 }
 
 export const SAMPLES: Sample[] = [
-  { id: "parts", title: "Parts on a table", told: "balls, rods and a box, from a scanner of 0.15 mm", make: parts },
-  { id: "pipes", title: "Pipes at a wall", told: "pipes, an elbow and a tank, from a lidar of 1.5 mm", make: pipes },
-  { id: "waves", title: "Hills and hollows", told: "all kinds of curvature, on one surface", make: waves },
+  { id: "parts", title: "Parts on a table", told: "balls, rods and a box, from a scanner of 0.15 mm", radius: 0.012, make: parts },
+  { id: "pipes", title: "Pipes at a wall", told: "pipes, an elbow and a tank, from a lidar of 1.5 mm", radius: 0.08, make: pipes },
+  { id: "waves", title: "Hills and hollows", told: "all kinds of curvature, on one surface", radius: 0.2, make: waves },
 ];

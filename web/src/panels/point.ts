@@ -1,6 +1,6 @@
 /** What is known of the clicked points, and how similar two of them are. */
 
-import { text, unitText, withError } from "../numbers.js";
+import { count, text, unitText, withError } from "../numbers.js";
 import { column, similarityClass } from "../quantities.js";
 import type { State } from "../state.js";
 import type { Layer } from "../view/layer.js";
@@ -37,10 +37,10 @@ export function pointPanel(state: State, actions: Actions): Panel {
         body.replaceChildren(h("p", { class: "note" }, `Click a point to read its values${more}. Shift-click a second one to compare.`));
         return;
       }
-      const parts: Node[] = [h("h3", {}, h("b", { class: "mark" }, "A"), placeText(layer, first)), valuesOf(state, layer, first)];
+      const parts: Node[] = [h("h3", {}, h("b", { class: "mark" }, "A"), placeText(layer, first, state.spacing)), valuesOf(state, layer, first)];
       if (second !== null) {
         const zeta = column(layer, "zeta")[second] ?? NaN;
-        parts.push(h("h3", {}, h("b", { class: "mark second" }, "B"), placeText(layer, second)), valuesOf(state, layer, second));
+        parts.push(h("h3", {}, h("b", { class: "mark second" }, "B"), placeText(layer, second, state.spacing)), valuesOf(state, layer, second));
         const told = Number.isNaN(zeta) ? "not known" : `${zeta.toFixed(3)} (${similarityClass(zeta)})`;
         parts.push(h("p", { class: "result", id: "zeta" }, h("span", {}, "zeta of A and B"), h("strong", {}, told)));
         const apart = [0, 1, 2].map((axis) => layer.positions[3 * first + axis] - layer.positions[3 * second + axis]);
@@ -57,9 +57,11 @@ export function pointPanel(state: State, actions: Actions): Panel {
   };
 }
 
-function placeText(layer: Layer, point: number): string {
+/** Coordinates to a tenth of the spacing. */
+function placeText(layer: Layer, point: number, spacing: number): string {
   const place = [0, 1, 2].map((axis) => layer.positions[3 * point + axis] + layer.origin[axis]);
-  return place.map((c) => text(c, layer.origin.some((o) => o !== 0) ? 9 : 4)).join(", ");
+  const decimals = spacing > 0 ? Math.min(8, Math.max(0, 1 - Math.floor(Math.log10(spacing)))) : 4;
+  return place.map((c) => c.toFixed(decimals).replace("-", "−")).join(", ");
 }
 
 /** All that is known of a point, with standard errors. */
@@ -72,8 +74,8 @@ function valuesOf(state: State, layer: Layer, i: number): HTMLElement {
     rows.push(["k1", `${withError(k1, s1)} ${per}`], ["k2", `${withError(k2, s2)} ${per}`]);
     rows.push(["H", `${withError((k1 + k2) / 2, value("mean_curvature_std"))} ${per}`]);
     rows.push(["K", `${withError(k1 * k2, Math.hypot(k2 * s1, k1 * s2))} ${square}`]);
-    rows.push(["Radii of curvature", `${radius(k1, s1)}, ${radius(k2, s2)} ${unitText(state.unit, 1)}`]);
-    if (layer.columns.has("count")) rows.push(["Points in the ball", text(value("count"), 6)]);
+    rows.push(["Radii of curvature", radii(k1, s1, k2, s2, unitText(state.unit, 1))]);
+    if (layer.columns.has("count")) rows.push(["Points in the ball", count(value("count"))]);
     if (layer.columns.has("radius")) rows.push(["Radius of the ball", `${text(value("radius"))} ${unitText(state.unit, 1)}`]);
     const status = STATUSES[value("status")] ?? "";
     if (status !== "") rows.push(["Status", status]);
@@ -90,9 +92,18 @@ function valuesOf(state: State, layer: Layer, i: number): HTMLElement {
   return facts(rows);
 }
 
+/** Both radii of curvature, with their unit. */
+function radii(k1: number, s1: number, k2: number, s2: number, unit: string): string {
+  const [one, two] = [radius(k1, s1), radius(k2, s2)];
+  const both = one === two && one === FLAT ? "flat within the error" : `${one}, ${two}`;
+  return /\d/.test(both) ? `${both} ${unit}` : both;
+}
+
+const FLAT = "flat";
+
 /** A radius of curvature with its error; "flat" where the curvature is within its error. */
 function radius(k: number, error: number): string {
   if (Number.isNaN(k)) return "–";
-  if (Math.abs(k) < SIGNIFICANT * error) return "flat";
+  if (Math.abs(k) < SIGNIFICANT * error) return FLAT;
   return withError(1 / k, error / (k * k));
 }

@@ -21,6 +21,9 @@ import { POINT_FRAGMENT, POINT_VERTEX } from "./shaders.js";
 /** Points of a block: few enough that blocks out of view save much, many enough that calls are few. */
 const BLOCK_POINTS = 40_000;
 
+/** Most points of a block: software renderers draw nothing of more. */
+const MOST_BLOCK_POINTS = 65_535;
+
 /** Most blocks along an axis. */
 const MOST_CELLS = 24;
 
@@ -72,6 +75,11 @@ export class PointLayer {
   }
 
   private addBlock(positions: Float32Array, start: number, end: number): void {
+    if (end - start > MOST_BLOCK_POINTS) {
+      this.addBlock(positions, start, start + MOST_BLOCK_POINTS);
+      this.addBlock(positions, start + MOST_BLOCK_POINTS, end);
+      return;
+    }
     if (end === start) return;
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(positions.subarray(3 * start, 3 * end), 3));

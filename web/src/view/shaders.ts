@@ -56,9 +56,11 @@ uniform float far;
 uniform float strength;
 uniform vec3 background;
 
+const float NOTHING = 1e6;
+
 float logDepth(vec2 at) {
   float depth = texture2D(depths, at).x;
-  if (depth >= 1.0) return -1.0;
+  if (depth >= 1.0) return NOTHING;
   float z = 2.0 * depth - 1.0;
   return log2(2.0 * near * far / (far + near - z * (far - near)));
 }
@@ -67,18 +69,18 @@ void main() {
   float own = logDepth(where);
   float sum = 0.0;
   float weight = 0.0;
+  if (own == NOTHING) {
+    gl_FragColor = vec4(background, 1.0);
+    return;
+  }
   for (int ring = 1; ring <= 2; ring++) {
     for (int i = 0; i < 8; i++) {
       float angle = 0.7853981634 * float(i) + 0.39 * float(ring - 1);
       float depth = logDepth(where + 1.4 * float(ring) * pixel * vec2(cos(angle), sin(angle)));
       weight += 1.0;
-      if (own < 0.0) sum += depth < 0.0 ? 0.0 : 0.3;
-      else if (depth >= 0.0) sum += max(0.0, own - depth);
+      // Edges before the background are no darker than others: the sum of one pixel is limited.
+      if (depth < NOTHING) sum += min(max(0.0, own - depth), 0.06);
     }
-  }
-  if (own < 0.0) {
-    gl_FragColor = vec4(background, 1.0);
-    return;
   }
   float shade = exp(-strength * sum / weight);
   gl_FragColor = vec4(texture2D(colours, where).rgb * shade, 1.0);

@@ -32,6 +32,8 @@ const MOVING_START = 1_000_000;
 const MOVING_LEAST = 60_000;
 /** Milliseconds of a frame above which fewer points are drawn while moving, and below which more. */
 const [SLOW_FRAME, FAST_FRAME] = [40, 18];
+/** Darkness of an edge, per power of two by which its other side is nearer. */
+const EYE_DOME = 18;
 /** Milliseconds without a motion after which all are drawn. */
 const REST = 180;
 
@@ -82,7 +84,7 @@ export class Viewer {
         pixel: { value: new Vector2() },
         near: { value: 1 },
         far: { value: 1 },
-        strength: { value: 60 },
+        strength: { value: EYE_DOME },
         background: { value: new Color() },
       },
     });
@@ -148,13 +150,14 @@ export class Viewer {
   }
 
   setShading(eyeDome: boolean, normals: boolean): void {
-    this.eyeDome.uniforms.strength.value = eyeDome ? 60 : 0;
+    this.eyeDome.uniforms.strength.value = eyeDome ? EYE_DOME : 0;
     for (const { material } of this.layers) material.uniforms.shading.value = normals ? 1 : 0;
     this.render();
   }
 
   /** Shows all points, from in front and above, or from a direction. */
   fit(from: Vector = [0.45, -1, 0.62]): void {
+    this.resized();
     const box = new Box3();
     for (const layer of this.layers) box.union(layer.box.clone().applyMatrix4(layer.group.matrixWorld));
     for (const overlay of this.overlays) box.expandByObject(overlay);
