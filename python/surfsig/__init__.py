@@ -73,6 +73,7 @@ from surfsig.shapes import (
     fit_sphere,
     fit_torus,
 )
+from surfsig.browser import show
 from surfsig.signature_similarity import flip_signatures, similarity, similarity_class, similarity_matrix
 from surfsig.surfaces import (
     PipeJoint,
@@ -175,6 +176,7 @@ __all__ = [
     "register_multiway",
     "remove_missing_returns",
     "remove_outliers",
+    "show",
     "similarity",
     "similarity_class",
     "similarity_matrix",

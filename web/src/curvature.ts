@@ -29,6 +29,8 @@ export function layerOf(cloud: CloudData): Layer {
     colour: null,
     columns: new Map(Object.entries(cloud.fields).filter(([name]) => !normalNames.includes(name))),
     labels: null,
+    labelName: "Surface",
+    viewpoint: cloud.viewpoint,
     stage: null,
     transform: null,
   };

@@ -162,7 +162,7 @@ export function quantitiesOf(layer: Layer): Quantity[] {
     });
   }
   const { labels, normals, colours, colour } = layer;
-  if (labels !== null) add("surface", "Surface", 0, (of) => bySurface(of, of.labels ?? labels));
+  if (labels !== null) add("surface", layer.labelName, 0, (of) => bySurface(of, of.labels ?? labels));
   if (has("deviation")) {
     add("deviation", "Distance from the surface", 1, (of) => onDivergingScale(column(of, "deviation")));
   }

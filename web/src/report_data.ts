@@ -27,6 +27,7 @@ interface PackedLayer {
   colours: Packed[] | null;
   colour: Rgb | null;
   labels: Packed | null;
+  labelName: string;
   columns: { name: string; values: Packed }[];
   stage: Stage;
   transform: number[] | null;
@@ -84,6 +85,8 @@ function layerOf(packed: PackedLayer, data: Uint8Array): Layer & { total: number
     colour: packed.colour,
     labels: packed.labels === null ? null : Int32Array.from(numbers(packed.labels)),
     columns: withMeans(new Map(packed.columns.map(({ name, values }) => [name, numbers(values)]))),
+    labelName: packed.labelName,
+    viewpoint: null,
     stage: packed.stage,
     transform: packed.transform,
   };

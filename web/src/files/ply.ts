@@ -1,7 +1,7 @@
 /** PLY, ASCII and binary. Of elements other than vertices only the size counts. */
 
 import { checkLength, column, columnFor, getter, sizeOf, type Type } from "./binary.js";
-import { type Columns, FileError } from "./cloud.js";
+import { type Columns, FileError, type Vector } from "./cloud.js";
 
 const TYPES: Record<string, Type> = {
   char: "i1",
@@ -38,6 +38,7 @@ interface Element {
 interface Header {
   format: "ascii" | "binary_little_endian" | "binary_big_endian";
   elements: Element[];
+  viewpoint: Vector | null;
   /** Where the data start. */
   end: number;
 }
@@ -65,6 +66,7 @@ export function readPly(name: string, bytes: Uint8Array<ArrayBuffer>): Columns {
     names: vertices.properties.map((property) => property.name),
     columns,
     colourScale: scale,
+    viewpoint: header.viewpoint,
   };
 }
 
@@ -74,6 +76,7 @@ function headerOf(name: string, bytes: Uint8Array): Header {
   if (end === null) throw new FileError(`${name}: the PLY header has no end_header`);
   let format: Header["format"] | null = null;
   const elements: Element[] = [];
+  let viewpoint: Vector | null = null;
   for (const line of text.slice(0, end.index).split(/\r?\n|\r/)) {
     const words = line.trim().split(/\s+/);
     if (words[0] === "format") {
@@ -85,6 +88,10 @@ function headerOf(name: string, bytes: Uint8Array): Header {
       const count = Number(words[2]);
       if (!Number.isInteger(count) || count < 0) throw new FileError(`${name}: bad PLY header line "${line}"`);
       elements.push({ name: words[1], count, properties: [] });
+    } else if (words[0] === "comment" && words[2] === "viewpoint") {
+      // As surfsig writes it: comment surfsig viewpoint X Y Z.
+      const place = words.slice(3, 6).map(Number);
+      if (place.length === 3 && place.every(Number.isFinite)) viewpoint = place as Vector;
     } else if (words[0] === "property") {
       const isList = words[1] === "list";
       const types = words.slice(isList ? 2 : 1, -1).map((word) => TYPES[word]);
@@ -96,7 +103,7 @@ function headerOf(name: string, bytes: Uint8Array): Header {
     }
   }
   if (format === null) throw new FileError(`${name}: the PLY header names no format`);
-  return { format, elements, end: end.index + end[0].length };
+  return { format, elements, viewpoint, end: end.index + end[0].length };
 }
 
 function binaryColumns(

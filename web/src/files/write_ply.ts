@@ -14,7 +14,7 @@ interface Written {
 const SIZES = { float: 4, double: 8, int: 4, uchar: 1 };
 
 export function writePly(layer: Layer): Blob {
-  const { positions, origin, normals, colours, labels, columns, count } = layer;
+  const { positions, origin, normals, colours, labels, columns, count, viewpoint } = layer;
   const far = origin.some((c) => c !== 0);
   const properties: Written[] = ["x", "y", "z"].map((name, axis) => ({
     type: far ? "double" : "float",
@@ -39,6 +39,7 @@ export function writePly(layer: Layer): Blob {
     "ply",
     "format binary_little_endian 1.0",
     "comment written by the page of surfsig",
+    ...(viewpoint === null ? [] : [`comment surfsig viewpoint ${viewpoint.join(" ")}`]),
     `element vertex ${count}`,
     ...properties.map(({ type, name }) => `property ${type} ${name}`),
     "end_header\n",

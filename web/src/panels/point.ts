@@ -33,7 +33,7 @@ export function pointPanel(state: State, actions: Actions): Panel {
       if (layer === null) return;
       clear.hidden = first === null;
       if (first === null) {
-        const more = layer.columns.has("k1") ? " and see where else its surface occurs" : "";
+        const more = state.computedRadius !== null ? " and see where else its surface occurs" : "";
         body.replaceChildren(h("p", { class: "note" }, `Click a point to read its values${more}. Shift-click a second one to compare.`));
         return;
       }
@@ -83,7 +83,7 @@ function valuesOf(state: State, layer: Layer, i: number): HTMLElement {
   if (layer.normals !== null) {
     rows.push(["Normal", [0, 1, 2].map((axis) => text(layer.normals?.[3 * i + axis] ?? NaN, 3)).join(", ")]);
   }
-  if (layer.labels !== null) rows.push(["Surface", layer.labels[i] >= 0 ? String(layer.labels[i]) : "none"]);
+  if (layer.labels !== null) rows.push([layer.labelName, layer.labels[i] >= 0 ? String(layer.labels[i]) : "none"]);
   const told = new Set(["k1", "k2", "k1_std", "k2_std", "mean_curvature", "mean_curvature_std", "gaussian_curvature"]);
   for (const name of ["count", "radius", "status", "zeta", "residual"]) told.add(name);
   for (const name of layer.columns.keys()) {

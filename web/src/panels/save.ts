@@ -20,7 +20,7 @@ export function savePanel(state: State, actions: Actions): Panel {
     update(): void {
       element.hidden = state.layer === null;
       const none = state.found === null || state.found.surfaces.length === 0;
-      for (const [i, [kind]] of KINDS.entries()) buttons[i].disabled = none && (kind === "csv" || kind === "json");
+      for (const [i, [kind]] of KINDS.entries()) buttons[i].hidden = none && (kind === "csv" || kind === "json");
     },
   };
 }

@@ -29,7 +29,7 @@ export function welcome(actions: Actions, choose: () => void): HTMLElement {
     h(
       "p",
       {},
-      "Drop a 3D scan here. See its curvature, click a place and see where else that surface occurs, find its planes, pipes and balls with their radii and errors.",
+      "Drop a 3D scan here. See its curvature, click a point and see where else that surface occurs, find its planes, pipes and balls with their radii and errors.",
     ),
     h("div", { class: "actions" }, button("Choose a file", choose, { class: "primary" })),
     h("p", { class: "note" }, "PLY, PCD, LAS, LAZ, OBJ, XYZ, CSV. Or a sample:"),

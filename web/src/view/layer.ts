@@ -22,6 +22,9 @@ export interface Layer {
   columns: Map<string, Float32Array<ArrayBuffer>>;
   /** Of each point the number of its row in the table; -1 for none. */
   labels: Int32Array<ArrayBuffer> | null;
+  /** What a label is: "Surface", "Instance". */
+  labelName: string;
+  viewpoint: Vector | null;
   stage: Stage;
   /** T_target_source, row by row, that the points are moved by between before and after. */
   transform: number[] | null;
