@@ -33,7 +33,10 @@ function sourcesHash() {
     .filter((entry) => entry.isFile())
     .map((entry) => path.relative(web, path.join(entry.parentPath, entry.name)).split(path.sep).join("/"));
   for (const file of [...files, "package-lock.json", "engine_exports.txt", "build.mjs"].sort()) {
-    hash.update(file).update("\0").update(readFileSync(path.join(web, file), "utf8").replaceAll("\r\n", "\n"));
+    hash
+      .update(file)
+      .update("\0")
+      .update(readFileSync(path.join(web, file), "utf8").replaceAll("\r\n", "\n"));
   }
   return hash.digest("hex");
 }
@@ -41,7 +44,9 @@ function sourcesHash() {
 /** gzip in base64, always of the same bytes. */
 const packed = (bytes) => gzipSync(bytes, { level: 9 }).toString("base64");
 
-const [page, worker, unpack] = await Promise.all(["main.ts", "engine/worker.ts", "unpack_page.ts"].map(bundled));
+const [page, worker, unpack] = await Promise.all(
+  ["main.ts", "engine/worker.ts", "unpack_page.ts"].map(bundled),
+);
 const parts = {
   sources: sourcesHash(),
   style: readFileSync(path.join(web, "src", "style.css"), "utf8"),

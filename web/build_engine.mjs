@@ -1,7 +1,7 @@
 /** Builds the core for WebAssembly, with what compiler there is, into dist/engine.wasm. */
 
 import { execFileSync, spawnSync } from "node:child_process";
-import { existsSync, mkdirSync, readFileSync, readdirSync } from "node:fs";
+import { existsSync, mkdirSync, readFileSync } from "node:fs";
 import path from "node:path";
 import { fileURLToPath } from "node:url";
 
@@ -36,9 +36,9 @@ function toolchain() {
 
 const found = toolchain();
 if (found === null) {
-  console.error(
+  process.stderr.write(
     `the engine needs Rust's target ${TARGET}: install rustup (https://rustup.rs), which fetches it, ` +
-      "or Debian's packages rustc-web, rust-web-src and lld",
+      "or Debian's packages rustc-web, rust-web-src and lld\n",
   );
   process.exit(3);
 }

@@ -50,8 +50,9 @@ export class Application implements Actions {
   /** Opens what the page's link says. */
   openLink(): void {
     this.linked = readLink();
-    if (this.linked?.sample != null) this.openSample(this.linked.sample);
-    else if (this.linked?.file != null) this.frame.tell(`Drop ${this.linked.file} here to see the linked view.`);
+    const { sample, file } = this.linked ?? { sample: null, file: null };
+    if (sample !== null) this.openSample(sample);
+    else if (file !== null) this.frame.tell(`Drop ${file} here to see the linked view.`);
   }
 
   openSample(id: string): void {
@@ -87,7 +88,12 @@ export class Application implements Actions {
     this.cancel();
     this.begin(layerOf(cloud));
     const { state, viewer } = this;
-    Object.assign(state, { sample, format: sample === null ? cloud.format : "", leftOut: cloud.left_out, unit: unitOf(cloud, sample) });
+    Object.assign(state, {
+      sample,
+      format: sample === null ? cloud.format : "",
+      leftOut: cloud.left_out,
+      unit: unitOf(cloud, sample),
+    });
     this.update();
     viewer.fit();
     this.setQuantity(cloud.colours === null ? "height" : "file");
@@ -106,7 +112,8 @@ export class Application implements Actions {
     if (generation !== this.generation || state.spacing <= 0) return;
     if (cloud.count <= MOST_AT_ONCE) await this.compute();
     const point = this.linked?.point ?? null;
-    if (point !== null && point < cloud.count && generation === this.generation) await this.choosePoint(point, false);
+    if (point !== null && point < cloud.count && generation === this.generation)
+      await this.choosePoint(point, false);
     this.linked = null;
   }
 
@@ -126,11 +133,15 @@ export class Application implements Actions {
     this.viewer.clear();
     this.viewer.origin = first?.origin ?? [0, 0, 0];
     for (const layer of report.layers) this.viewer.add(new PointLayer(layer, this.viewer.origin));
-    if (report.trajectory !== null) this.viewer.addOverlay(drawnTrajectory(report.trajectory, this.viewer.origin));
+    if (report.trajectory !== null)
+      this.viewer.addOverlay(drawnTrajectory(report.trajectory, this.viewer.origin));
     this.drawn = this.viewer.layers[0] ?? null;
     const total = report.layers.reduce((sum, layer) => sum + layer.total, 0);
     const kept = report.layers.reduce((sum, layer) => sum + layer.count, 0);
-    const format = kept < total ? `report, ${kept.toLocaleString("en")} of ${total.toLocaleString("en")} points` : "report";
+    const format =
+      kept < total
+        ? `report, ${kept.toLocaleString("en")} of ${total.toLocaleString("en")} points`
+        : "report";
     Object.assign(this.state, initialState(), { layer: first ?? null, format, unit: report.unit });
     this.frame.addReport(report, (share) => this.painter.setStage(share));
     this.update();
@@ -138,7 +149,9 @@ export class Application implements Actions {
     this.viewer.fit();
     if (this.drawn !== null) {
       const size = this.drawn.box.getSize(this.viewer.camera.position.clone());
-      this.viewer.setPointSize((1.6 * Math.hypot(size.x, size.y)) / Math.sqrt(Math.max(1, this.drawn.layer.count)));
+      this.viewer.setPointSize(
+        (1.6 * Math.hypot(size.x, size.y)) / Math.sqrt(Math.max(1, this.drawn.layer.count)),
+      );
       const known = quantitiesOf(this.drawn.layer).some(({ id }) => id === report.quantity);
       this.setQuantity(known ? report.quantity : "plain");
     }
@@ -190,7 +203,8 @@ export class Application implements Actions {
     try {
       await work(await this.engine);
     } catch (error) {
-      if (!(error instanceof Cancelled)) this.frame.tell(error instanceof Error ? error.message : String(error));
+      if (!(error instanceof Cancelled))
+        this.frame.tell(error instanceof Error ? error.message : String(error));
     } finally {
       if (this.state.running === what || generation === this.generation) this.state.running = null;
       this.update();
@@ -250,7 +264,8 @@ export class Application implements Actions {
     }
     if (picked.layer !== this.drawn) return;
     if (state.quantity === "surface") {
-      [state.first, state.second] = second && state.first !== null ? [state.first, picked.point] : [picked.point, null];
+      [state.first, state.second] =
+        second && state.first !== null ? [state.first, picked.point] : [picked.point, null];
       this.update();
     } else void this.choosePoint(picked.point, second);
   }
@@ -258,7 +273,8 @@ export class Application implements Actions {
   choose(row: number, second: boolean): void {
     const { state } = this;
     if (row < 0) state.chosen = [];
-    else if (second && state.chosen.length > 0 && state.chosen[0] !== row) state.chosen = [state.chosen[0], row];
+    else if (second && state.chosen.length > 0 && state.chosen[0] !== row)
+      state.chosen = [state.chosen[0], row];
     else state.chosen = state.chosen.length === 1 && state.chosen[0] === row ? [] : [row];
     this.painter.paint();
     this.update();
@@ -320,9 +336,13 @@ export class Application implements Actions {
     if (layer === null) return;
     const name = layer.name.replace(/\.\w+$/, "").replace(/\s+/g, "_");
     if (kind === "ply") save(`${name}_curvature.ply`, writePly(layer));
-    else if (kind === "csv") save(`${name}_surfaces.csv`, new Blob([surfacesCsv(found?.surfaces ?? [])], { type: "text/csv" }));
+    else if (kind === "csv")
+      save(`${name}_surfaces.csv`, new Blob([surfacesCsv(found?.surfaces ?? [])], { type: "text/csv" }));
     else if (kind === "json") {
-      save(`${name}_surfaces.json`, new Blob([surfacesJson(found?.surfaces ?? [], layer.name)], { type: "application/json" }));
+      save(
+        `${name}_surfaces.json`,
+        new Blob([surfacesJson(found?.surfaces ?? [], layer.name)], { type: "application/json" }),
+      );
     } else if (kind === "picture") void this.viewer.picture().then((picture) => save(`${name}.png`, picture));
     else this.frame.copy(linkOf(this.state, this.viewer.state));
   }

@@ -37,10 +37,13 @@ export function frame(root: HTMLElement, state: State, actions: Actions): Frame 
     id: "view",
     tabindex: 0,
     role: "img",
-    "aria-label": "The points in a view that turns. Arrow keys turn it, plus and minus come nearer, ? shows all keys.",
+    "aria-label":
+      "The points in a view that turns. Arrow keys turn it, plus and minus come nearer, ? shows all keys.",
   });
   const legend = new Legend();
-  const marks = ["A", "B"].map((letter, i) => h("span", { class: i === 0 ? "pin" : "pin second", "aria-hidden": "true" }, letter));
+  const marks = ["A", "B"].map((letter, i) =>
+    h("span", { class: i === 0 ? "pin" : "pin second", "aria-hidden": "true" }, letter),
+  );
   const drawnText = h("div", { id: "drawn" });
   const bar = h("div", { class: "done" });
   const running = h("span", {});
@@ -48,11 +51,26 @@ export function frame(root: HTMLElement, state: State, actions: Actions): Frame 
     "div",
     { id: "progress", role: "status" },
     running,
-    h("div", { class: "track", role: "progressbar", "aria-label": "Progress", "aria-valuemin": 0, "aria-valuemax": 100 }, bar),
+    h(
+      "div",
+      {
+        class: "track",
+        role: "progressbar",
+        "aria-label": "Progress",
+        "aria-valuemin": 0,
+        "aria-valuemax": 100,
+      },
+      bar,
+    ),
     button("Stop", () => actions.cancel(), { id: "stop", title: "Esc" }),
   );
   const messageText = h("span", {});
-  const message = h("div", { id: "message", role: "alert" }, messageText, button("×", () => tell(""), { "aria-label": "Close the message" }));
+  const message = h(
+    "div",
+    { id: "message", role: "alert" },
+    messageText,
+    button("×", () => tell(""), { "aria-label": "Close the message" }),
+  );
   const chooser = fileChooser(actions);
   const help = helpDialog();
   const start = welcome(actions, () => chooser.click());
@@ -60,7 +78,11 @@ export function frame(root: HTMLElement, state: State, actions: Actions): Frame 
   const header = h(
     "header",
     {},
-    h("a", { class: "name", href: location.href.split("#")[0], "aria-label": "surfsig, from the start" }, "surfsig"),
+    h(
+      "a",
+      { class: "name", href: location.href.split("#")[0], "aria-label": "surfsig, from the start" },
+      "surfsig",
+    ),
     h(
       "nav",
       { "aria-label": "Page" },
@@ -78,8 +100,24 @@ export function frame(root: HTMLElement, state: State, actions: Actions): Frame 
     surfacesPanel(state, actions),
     savePanel(state, actions),
   ];
-  const aside = h("aside", { id: "panel", "aria-label": "Scan, curvature, surfaces" }, header, ...panels.map(({ element }) => element));
-  const view = h("main", { id: "stage-area" }, canvas, legend.element, drawnText, ...marks, progress, message, start, chooser);
+  const aside = h(
+    "aside",
+    { id: "panel", "aria-label": "Scan, curvature, surfaces" },
+    header,
+    ...panels.map(({ element }) => element),
+  );
+  const view = h(
+    "main",
+    { id: "stage-area" },
+    canvas,
+    legend.element,
+    drawnText,
+    ...marks,
+    progress,
+    message,
+    start,
+    chooser,
+  );
   root.replaceChildren(view, aside, help);
   legend.element.hidden = true;
   message.hidden = true;
@@ -94,7 +132,9 @@ export function frame(root: HTMLElement, state: State, actions: Actions): Frame 
     viewer?.setBackground(getComputedStyle(view).backgroundColor);
   }
   function switchTheme(): void {
-    const dark = document.documentElement.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    const dark =
+      document.documentElement.dataset.theme ??
+      (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
     document.documentElement.dataset.theme = dark === "dark" ? "light" : "dark";
     setBackground();
   }
@@ -114,7 +154,12 @@ export function frame(root: HTMLElement, state: State, actions: Actions): Frame 
       bar.parentElement?.setAttribute("aria-valuenow", String(Math.round(100 * share)));
     },
     showDrawn(drawn: number, total: number): void {
-      drawnText.textContent = total === 0 ? "" : drawn < total ? `${count(drawn)} of ${count(total)} points drawn` : `${count(total)} points`;
+      drawnText.textContent =
+        total === 0
+          ? ""
+          : drawn < total
+            ? `${count(drawn)} of ${count(total)} points drawn`
+            : `${count(total)} points`;
     },
     placeMarks(places): void {
       places.forEach((place, i) => {
@@ -144,7 +189,8 @@ export function frame(root: HTMLElement, state: State, actions: Actions): Frame 
       progress.hidden = state.running === null;
       running.textContent = state.running ?? "";
       for (const panel of panels) panel.update();
-      if (inReport) for (const id of ["surfaces", "curvature"]) aside.querySelector<HTMLElement>(`#${id}`)!.hidden = true;
+      if (inReport)
+        for (const id of ["surfaces", "curvature"]) aside.querySelector<HTMLElement>(`#${id}`)!.hidden = true;
       viewer?.render();
     },
   };

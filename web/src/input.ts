@@ -71,7 +71,14 @@ export function listen(
   };
   document.addEventListener("keydown", (event) => {
     const { tagName } = event.target as HTMLElement;
-    if (event.ctrlKey || event.metaKey || event.altKey || tagName === "SELECT" || document.querySelector("dialog[open]")) return;
+    if (
+      event.ctrlKey ||
+      event.metaKey ||
+      event.altKey ||
+      tagName === "SELECT" ||
+      document.querySelector("dialog[open]")
+    )
+      return;
     const isRange = tagName === "INPUT";
     const arrow = arrows[event.key];
     if (arrow !== undefined && !isRange && tagName !== "TR") {

@@ -20,7 +20,10 @@ export function linkOf(state: State, view: ViewState): string {
   const linked: Linked = {
     sample: state.sample,
     file: state.sample === null ? (state.layer?.name ?? null) : null,
-    view: { position: rounded(view.position) as ViewState["position"], target: rounded(view.target) as ViewState["target"] },
+    view: {
+      position: rounded(view.position) as ViewState["position"],
+      target: rounded(view.target) as ViewState["target"],
+    },
     quantity: state.quantity,
     radius: state.auto ? "auto" : state.radius,
     unit: state.unit,

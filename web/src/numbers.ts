@@ -10,7 +10,9 @@ export function text(value: number, digits = 3): string {
     return `${minus(mantissa)} × 10${superscript(Number(exponent))}`;
   }
   const decimals = Math.max(0, digits - 1 - Math.floor(Math.log10(size)));
-  return minus(value.toLocaleString("en", { maximumFractionDigits: decimals, minimumFractionDigits: decimals }));
+  return minus(
+    value.toLocaleString("en", { maximumFractionDigits: decimals, minimumFractionDigits: decimals }),
+  );
 }
 
 const minus = (written: string): string => written.replace("-", "−");
@@ -60,7 +62,8 @@ function incompleteBeta(x: number, a: number, b: number): number {
   if (x <= 0) return 0;
   if (x >= 1) return 1;
   if (x > (a + 1) / (a + b + 2)) return 1 - incompleteBeta(1 - x, b, a);
-  const front = Math.exp(logGamma(a + b) - logGamma(a) - logGamma(b) + a * Math.log(x) + b * Math.log(1 - x)) / a;
+  const front =
+    Math.exp(logGamma(a + b) - logGamma(a) - logGamma(b) + a * Math.log(x) + b * Math.log(1 - x)) / a;
   const tiny = 1e-300;
   let [c, d] = [1, 1 / keepAway(1 - ((a + b) * x) / (a + 1), tiny)];
   let fraction = d;
@@ -82,7 +85,10 @@ const keepAway = (value: number, tiny: number): number => (Math.abs(value) < tin
 
 /** Lanczos' approximation. */
 function logGamma(x: number): number {
-  const g = [76.18009172947146, -86.50532032941677, 24.01409824083091, -1.231739572450155, 1.208650973866179e-3, -5.395239384953e-6];
+  const g = [
+    76.18009172947146, -86.50532032941677, 24.01409824083091, -1.231739572450155, 1.208650973866179e-3,
+    -5.395239384953e-6,
+  ];
   const shifted = x + 5.5 - (x + 0.5) * Math.log(x + 5.5);
   const series = g.reduce((sum, value, i) => sum + value / (x + 1 + i), 1.000000000190015);
   return Math.log((2.5066282746310005 * series) / x) - shifted;

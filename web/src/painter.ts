@@ -36,7 +36,8 @@ export class Painter {
   paint(): void {
     for (const drawn of this.viewer.layers) {
       const quantities = quantitiesOf(drawn.layer);
-      const quantity = quantities.find(({ id }) => id === this.state.quantity) ?? quantities[quantities.length - 1];
+      const quantity =
+        quantities.find(({ id }) => id === this.state.quantity) ?? quantities[quantities.length - 1];
       const coloured = quantity.colour(drawn.layer);
       const chosen = this.chosenOf(drawn.layer);
       if (chosen !== null) fade(coloured.colours, chosen);

@@ -54,12 +54,20 @@ export function similarityClass(zeta: number): string {
 function onDivergingScale(values: Float32Array): Coloured {
   const [end] = quantiles(values.map(Math.abs), [SHOWN_OF_SIZES]);
   const high = end > 0 ? end : 1;
-  return { colours: colourNumbers(values, "diverging", -high, high), scale: { kind: "diverging", low: -high, high }, entries: [] };
+  return {
+    colours: colourNumbers(values, "diverging", -high, high),
+    scale: { kind: "diverging", low: -high, high },
+    entries: [],
+  };
 }
 
 function onSequentialScale(values: Float32Array, ends?: [number, number]): Coloured {
   const [low, high] = ends ?? quantiles(values, SHOWN);
-  return { colours: colourNumbers(values, "sequential", low, high), scale: { kind: "sequential", low, high }, entries: [] };
+  return {
+    colours: colourNumbers(values, "sequential", low, high),
+    scale: { kind: "sequential", low, high },
+    entries: [],
+  };
 }
 
 function byClass(numbers: Int8Array | Int32Array, classes: { name: string; colour: Rgb }[]): Coloured {
@@ -135,7 +143,9 @@ const SIZES: [string, string, number][] = [
   ["radius", "Radius of the neighbourhood", 1],
 ];
 
-const KNOWN = new Set([...CURVATURES, ...SIZES].map(([name]) => name).concat("k1_std", "k2_std", "zeta", "deviation"));
+const KNOWN = new Set(
+  [...CURVATURES, ...SIZES].map(([name]) => name).concat("k1_std", "k2_std", "zeta", "deviation"),
+);
 
 /** What a layer can be coloured by, in the order of the list. */
 export function quantitiesOf(layer: Layer): Quantity[] {
@@ -157,7 +167,9 @@ export function quantitiesOf(layer: Layer): Quantity[] {
   if (has("zeta")) {
     add("zeta", "Similarity zeta with point A", 0, (of) => onSequentialScale(column(of, "zeta"), [0, 1]));
     add("zeta_class", "Class of similarity with A", 0, (of) => {
-      const classes = Int8Array.from(column(of, "zeta"), (z) => (z >= OPTIMAL ? 0 : z >= GOOD ? 1 : z >= 0 ? 2 : -1));
+      const classes = Int8Array.from(column(of, "zeta"), (z) =>
+        z >= OPTIMAL ? 0 : z >= GOOD ? 1 : z >= 0 ? 2 : -1,
+      );
       return byClass(classes, ZETA_CLASSES);
     });
   }
@@ -168,18 +180,30 @@ export function quantitiesOf(layer: Layer): Quantity[] {
   }
   if (normals !== null) add("normal", "Normal", 0, (of) => byNormal(of.normals ?? normals));
   if (colours !== null) {
-    add("file", "The file's own colours", 0, (of) => ({ colours: of.colours ?? colours, scale: null, entries: [] }));
+    add("file", "The file's own colours", 0, (of) => ({
+      colours: of.colours ?? colours,
+      scale: null,
+      entries: [],
+    }));
   }
   for (const id of layer.columns.keys()) {
-    if (!KNOWN.has(id)) add(`column:${id}`, id.replaceAll("_", " "), 0, (of) => onSequentialScale(column(of, id)));
+    if (!KNOWN.has(id))
+      add(`column:${id}`, id.replaceAll("_", " "), 0, (of) => onSequentialScale(column(of, id)));
   }
   if (colour === null) {
     const heights = (of: Layer): Coloured => {
-      const values = Float32Array.from({ length: of.count }, (_, i) => of.positions[3 * i + 2] + of.origin[2]);
+      const values = Float32Array.from(
+        { length: of.count },
+        (_, i) => of.positions[3 * i + 2] + of.origin[2],
+      );
       return onSequentialScale(values);
     };
     add("height", "Height z", 1, heights);
   }
-  add("plain", "One colour", 0, (of) => ({ colours: plain(of.count, of.colour ?? [168, 180, 194]), scale: null, entries: [] }));
+  add("plain", "One colour", 0, (of) => ({
+    colours: plain(of.count, of.colour ?? [168, 180, 194]),
+    scale: null,
+    entries: [],
+  }));
   return found;
 }

@@ -25,7 +25,8 @@ const cross = (a: Vector, b: Vector): Vector => [
 const norm = (a: Vector): number => Math.sqrt(dot(a, a));
 
 /** Angle between two lines, in degrees, 0 to 90. */
-const between = (a: Vector, b: Vector): number => (Math.atan2(norm(cross(a, b)), Math.abs(dot(a, b))) * 180) / Math.PI;
+const between = (a: Vector, b: Vector): number =>
+  (Math.atan2(norm(cross(a, b)), Math.abs(dot(a, b))) * 180) / Math.PI;
 
 const fromLine = (point: Vector, on: Vector, axis: Vector): number => norm(cross(minus(point, on), axis));
 
@@ -34,7 +35,8 @@ export function relation(a: Surface, b: Surface): Relation {
     surface.kind === "plane" ? "plane" : surface.kind === "sphere" ? "centre" : "axis",
   );
   if (first === second) {
-    if (first === "centre") return { angle: null, distance: norm(minus(b.point, a.point)), told: "between the centres" };
+    if (first === "centre")
+      return { angle: null, distance: norm(minus(b.point, a.point)), told: "between the centres" };
     const angle = between(a.axis, b.axis);
     if (first === "plane") {
       const parallel = angle <= PARALLEL;
@@ -43,7 +45,8 @@ export function relation(a: Surface, b: Surface): Relation {
       const distance = 0.5 * (Math.abs(dot(apart, a.axis)) + Math.abs(dot(apart, b.axis)));
       return { angle, distance: parallel ? distance : null, told: "between the planes" };
     }
-    if (angle <= PARALLEL) return { angle, distance: fromLine(b.point, a.point, a.axis), told: "between the axes" };
+    if (angle <= PARALLEL)
+      return { angle, distance: fromLine(b.point, a.point, a.axis), told: "between the axes" };
     const normal = cross(a.axis, b.axis);
     const distance = Math.abs(dot(minus(b.point, a.point), normal)) / norm(normal);
     return { angle, distance, told: "between the axes, where they are nearest" };
@@ -55,5 +58,9 @@ export function relation(a: Surface, b: Surface): Relation {
     const angle = 90 - between(one.axis, other.axis);
     return { angle, distance: angle <= PARALLEL ? distance : null, told: "from the axis to the plane" };
   }
-  return { angle: null, distance: fromLine(other.point, one.point, one.axis), told: "from the centre to the axis" };
+  return {
+    angle: null,
+    distance: fromLine(other.point, one.point, one.axis),
+    told: "from the centre to the axis",
+  };
 }

@@ -96,15 +96,26 @@ function layerOf(packed: PackedLayer, data: Uint8Array): Layer & { total: number
 function withMeans(columns: Layer["columns"]): Layer["columns"] {
   const [k1, k2] = [columns.get("k1"), columns.get("k2")];
   if (k1 !== undefined && k2 !== undefined) {
-    columns.set("mean_curvature", k1.map((k, i) => (k + k2[i]) / 2));
-    columns.set("gaussian_curvature", k1.map((k, i) => k * k2[i]));
+    columns.set(
+      "mean_curvature",
+      k1.map((k, i) => (k + k2[i]) / 2),
+    );
+    columns.set(
+      "gaussian_curvature",
+      k1.map((k, i) => k * k2[i]),
+    );
   }
   return columns;
 }
 
-function unpacked({ type, start, low, step }: Packed, count: number, data: Uint8Array): Float32Array<ArrayBuffer> {
+function unpacked(
+  { type, start, low, step }: Packed,
+  count: number,
+  data: Uint8Array,
+): Float32Array<ArrayBuffer> {
   const values = new Float32Array(count);
-  const plane = (number: number): Uint8Array => data.subarray(start + number * count, start + (number + 1) * count);
+  const plane = (number: number): Uint8Array =>
+    data.subarray(start + number * count, start + (number + 1) * count);
   if (type === "delta16") {
     const [below, above] = [plane(0), plane(1)];
     let sum = 0;
@@ -128,7 +139,8 @@ function unpacked({ type, start, low, step }: Packed, count: number, data: Uint8
     }
   } else {
     const bytes = plane(0);
-    for (let i = 0; i < count; i++) values[i] = low + step * (type === "int8" ? (bytes[i] << 24) >> 24 : bytes[i]);
+    for (let i = 0; i < count; i++)
+      values[i] = low + step * (type === "int8" ? (bytes[i] << 24) >> 24 : bytes[i]);
   }
   return values;
 }
@@ -158,7 +170,8 @@ function fromOctahedron(flat: Float32Array): Float32Array<ArrayBuffer> {
       continue;
     }
     const z = 1 - Math.abs(u) - Math.abs(v);
-    const [x, y] = z >= 0 ? [u, v] : [(1 - Math.abs(v)) * Math.sign(u || 1), (1 - Math.abs(u)) * Math.sign(v || 1)];
+    const [x, y] =
+      z >= 0 ? [u, v] : [(1 - Math.abs(v)) * Math.sign(u || 1), (1 - Math.abs(u)) * Math.sign(v || 1)];
     const length = Math.hypot(x, y, z);
     normals.set([x / length, y / length, z / length], 3 * i);
   }

@@ -93,29 +93,69 @@ const bend =
   (centre: Vector, major: number, minor: number, from: number): Surface =>
   (u, v) => {
     const [around, along] = [2 * Math.PI * u, from + (v * Math.PI) / 2];
-    const normal: Vector = [Math.cos(around) * Math.cos(along), Math.cos(around) * Math.sin(along), Math.sin(around)];
-    const middle: Vector = [centre[0] + major * Math.cos(along), centre[1] + major * Math.sin(along), centre[2]];
+    const normal: Vector = [
+      Math.cos(around) * Math.cos(along),
+      Math.cos(around) * Math.sin(along),
+      Math.sin(around),
+    ];
+    const middle: Vector = [
+      centre[0] + major * Math.cos(along),
+      centre[1] + major * Math.sin(along),
+      centre[2],
+    ];
     return { point: middle.map((c, i) => c + minor * normal[i]) as Vector, normal };
   };
 
 function parts(): CloudData {
-  const [table, outside]: [number, (p: Vector) => boolean] = [0.4, ([x, y]) => {
-    const under = [[-0.11, -0.06, 0.06], [0.1, 0.07, 0.045], [0.11, -0.09, 0.045]];
-    return under.every(([cx, cy, r]) => (x - cx) ** 2 + (y - cy) ** 2 > (0.85 * r) ** 2) && !(Math.abs(x + 0.07) < 0.05 && y > 0.07 && y < 0.15);
-  }];
+  const [table, outside]: [number, (p: Vector) => boolean] = [
+    0.4,
+    ([x, y]) => {
+      const under = [
+        [-0.11, -0.06, 0.06],
+        [0.1, 0.07, 0.045],
+        [0.11, -0.09, 0.045],
+      ];
+      return (
+        under.every(([cx, cy, r]) => (x - cx) ** 2 + (y - cy) ** 2 > (0.85 * r) ** 2) &&
+        !(Math.abs(x + 0.07) < 0.05 && y > 0.07 && y < 0.15)
+      );
+    },
+  ];
   const box: [Vector, Vector, Vector, Vector][] = [
-    [[-0.12, 0.07, 0.05], [0.1, 0, 0], [0, 0.08, 0], [0, 0, 1]],
-    [[-0.12, 0.07, 0], [0.1, 0, 0], [0, 0, 0.05], [0, -1, 0]],
-    [[-0.02, 0.07, 0], [0, 0.08, 0], [0, 0, 0.05], [1, 0, 0]],
+    [
+      [-0.12, 0.07, 0.05],
+      [0.1, 0, 0],
+      [0, 0.08, 0],
+      [0, 0, 1],
+    ],
+    [
+      [-0.12, 0.07, 0],
+      [0.1, 0, 0],
+      [0, 0, 0.05],
+      [0, -1, 0],
+    ],
+    [
+      [-0.02, 0.07, 0],
+      [0, 0.08, 0],
+      [0, 0, 0.05],
+      [1, 0, 0],
+    ],
   ];
   const above = ([, , z]: Vector): boolean => z > 0.0005;
   return scan("Parts on a table", [0.25, -0.6, 0.7], 0.00015, [
-    { surface: rectangle([-table / 2, -table / 2, 0], [table, 0, 0], [0, table, 0], [0, 0, 1]), points: 42000, seen: outside },
+    {
+      surface: rectangle([-table / 2, -table / 2, 0], [table, 0, 0], [0, table, 0], [0, 0, 1]),
+      points: 42000,
+      seen: outside,
+    },
     { surface: ball([-0.11, -0.06, 0.04], 0.06), points: 26000, seen: above },
     { surface: ball([0.1, 0.07, 0.03], 0.045), points: 16000, seen: above },
     { surface: tube([0.11, -0.16, 0.03], 1, 0.14, 0.03), points: 16000, seen: above },
     { surface: tube([0.0, -0.15, 0.015], 0, 0.07, 0.015), points: 5000, seen: above },
-    ...box.map(([corner, along, across, normal]) => ({ surface: rectangle(corner, along, across, normal), points: 6000 })),
+    ...box.map(([corner, along, across, normal]) => ({
+      surface: rectangle(corner, along, across, normal),
+      points: 6000,
+    })),
   ]);
 }
 
@@ -146,7 +186,25 @@ function waves(): CloudData {
 }
 
 export const SAMPLES: Sample[] = [
-  { id: "parts", title: "Parts on a table", told: "balls, rods and a box, from a scanner of 0.15 mm", radius: 0.012, make: parts },
-  { id: "pipes", title: "Pipes at a wall", told: "pipes, an elbow and a tank, from a lidar of 1.5 mm", radius: 0.08, make: pipes },
-  { id: "waves", title: "Hills and hollows", told: "all kinds of curvature, on one surface", radius: 0.2, make: waves },
+  {
+    id: "parts",
+    title: "Parts on a table",
+    told: "balls, rods and a box, from a scanner of 0.15 mm",
+    radius: 0.012,
+    make: parts,
+  },
+  {
+    id: "pipes",
+    title: "Pipes at a wall",
+    told: "pipes, an elbow and a tank, from a lidar of 1.5 mm",
+    radius: 0.08,
+    make: pipes,
+  },
+  {
+    id: "waves",
+    title: "Hills and hollows",
+    told: "all kinds of curvature, on one surface",
+    radius: 0.2,
+    make: waves,
+  },
 ];

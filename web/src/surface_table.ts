@@ -6,13 +6,16 @@ import { studentT, text } from "./numbers.js";
 /** Ends of the radius's 95 % interval; null where it has none. */
 export function interval(surface: Surface): [number, number] | null {
   const reach = studentT(surface.freedom) * surface.radiusStd;
-  return Number.isFinite(reach) && Number.isFinite(surface.radius) ? [surface.radius - reach, surface.radius + reach] : null;
+  return Number.isFinite(reach) && Number.isFinite(surface.radius)
+    ? [surface.radius - reach, surface.radius + reach]
+    : null;
 }
 
 /** What a row says about the size: the radius with its 95 % interval. */
 export function sizeText(surface: Surface): { radius: string; range: string } {
   const ends = interval(surface);
-  if (ends === null) return { radius: Number.isFinite(surface.radius) ? text(surface.radius) : "", range: "" };
+  if (ends === null)
+    return { radius: Number.isFinite(surface.radius) ? text(surface.radius) : "", range: "" };
   const half = ends[1] - surface.radius;
   const decimals = half > 0 ? Math.min(8, Math.max(0, 1 - Math.floor(Math.log10(half)))) : 4;
   return { radius: surface.radius.toFixed(decimals), range: `± ${half.toFixed(decimals)}` };
@@ -47,7 +50,10 @@ export function surfacesCsv(surfaces: Surface[]): string {
   const rows = surfaces.map((surface, number) => {
     const { point, axis, ...rest } = values(surface, number);
     const vector = (name: string, three: unknown): [string, number | string][] =>
-      ["x", "y", "z"].map((letter, i) => [`${name}_${letter}`, Array.isArray(three) ? (three[i] as number) : ""]);
+      ["x", "y", "z"].map((letter, i) => [
+        `${name}_${letter}`,
+        Array.isArray(three) ? (three[i] as number) : "",
+      ]);
     return Object.fromEntries([...Object.entries(rest), ...vector("point", point), ...vector("axis", axis)]);
   });
   const header = Object.keys(rows[0] ?? { number: 0 });

@@ -13,8 +13,8 @@ const WORD = 4;
 
 /** Bytes of a module that exports its import "p" again, of type (i32, i32, i32) -> i32: tables hold only such. */
 const TRAMPOLINE = new Uint8Array([
-  0, 97, 115, 109, 1, 0, 0, 0, 1, 8, 1, 96, 3, 127, 127, 127, 1, 127, 2, 7, 1, 1, 101, 1, 112, 0, 0, 7, 5, 1, 1,
-  112, 0, 0,
+  0, 97, 115, 109, 1, 0, 0, 0, 1, 8, 1, 96, 3, 127, 127, 127, 1, 127, 2, 7, 1, 1, 101, 1, 112, 0, 0, 7, 5, 1,
+  1, 112, 0, 0,
 ]);
 
 /** Memory of the caller's inside the module, to be released. */
@@ -70,7 +70,8 @@ export class EngineModule {
   allocate(bytes: number): Buffer {
     if (bytes === 0) return { pointer: 0, bytes: 0 };
     const pointer = this.functions.surfsig_allocate(bytes) >>> 0;
-    if (pointer === 0) throw new EngineError(`the browser has no memory for ${Math.round(bytes / 1e6)} MB more`);
+    if (pointer === 0)
+      throw new EngineError(`the browser has no memory for ${Math.round(bytes / 1e6)} MB more`);
     return { pointer, bytes };
   }
 

@@ -175,10 +175,7 @@ export class EngineCloud {
           ...(Object.fromEntries(values) as Record<keyof typeof columns, number>),
         };
       });
-      const labels = engine.integers(
-        pointer("labels"),
-        engine.value("surfsig_surfaces_label_count", found),
-      );
+      const labels = engine.integers(pointer("labels"), engine.value("surfsig_surfaces_label_count", found));
       return { surfaces, labels };
     } finally {
       if (found !== 0) engine.value("surfsig_surfaces_free", found);

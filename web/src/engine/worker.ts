@@ -57,7 +57,9 @@ async function work(id: number, request: Request): Promise<Results[keyof Results
 function buffers(result: unknown): Transferable[] {
   if (ArrayBuffer.isView(result)) return [result.buffer as ArrayBuffer];
   if (result === null || typeof result !== "object") return [];
-  return [...new Set(Object.values(result).flatMap((value) => (ArrayBuffer.isView(value) ? buffers(value) : [])))];
+  return [
+    ...new Set(Object.values(result).flatMap((value) => (ArrayBuffer.isView(value) ? buffers(value) : []))),
+  ];
 }
 
 /** Requests are done in their order, each after the last one's end. */

@@ -114,7 +114,11 @@ function originOf(axes: ArrayLike<number>[], kept: Uint32Array): Vector {
   return middle.map((value) => Math.round(value / step) * step) as Vector;
 }
 
-function coloursOf(channels: ArrayLike<number>[], kept: Uint32Array, scale?: number): Uint8Array<ArrayBuffer> {
+function coloursOf(
+  channels: ArrayLike<number>[],
+  kept: Uint32Array,
+  scale?: number,
+): Uint8Array<ArrayBuffer> {
   let full = scale;
   if (full === undefined) {
     let largest = 0;

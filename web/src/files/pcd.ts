@@ -23,7 +23,8 @@ export function readPcd(name: string, bytes: Uint8Array<ArrayBuffer>): Columns {
   const fields = fieldsOf(name, header);
   const [width, height] = [Number(header.WIDTH?.[0]), Number(header.HEIGHT?.[0] ?? 1)];
   const count = header.POINTS === undefined ? width * height : Number(header.POINTS[0]);
-  if (!Number.isInteger(count) || count < 0) throw new FileError(`${name}: the PCD header has no number of points`);
+  if (!Number.isInteger(count) || count < 0)
+    throw new FileError(`${name}: the PCD header has no number of points`);
   const start = end.index + end[0].length;
   const data = end[1].toLowerCase();
   const columns =
@@ -41,10 +42,20 @@ export function readPcd(name: string, bytes: Uint8Array<ArrayBuffer>): Columns {
   if (packed >= 0) {
     const words = packedColours(columns[packed], fields[packed].type);
     names.splice(packed, 1, "red", "green", "blue");
-    columns.splice(packed, 1, ...[16, 8, 0].map((bits) => Float32Array.from(words, (w) => (w >> bits) & 255)));
+    columns.splice(
+      packed,
+      1,
+      ...[16, 8, 0].map((bits) => Float32Array.from(words, (w) => (w >> bits) & 255)),
+    );
     colourScale = 255;
   }
-  return { format: `PCD (${data.replace("_", " ")})`, names, columns, colourScale, viewpoint: viewpointOf(header) };
+  return {
+    format: `PCD (${data.replace("_", " ")})`,
+    names,
+    columns,
+    colourScale,
+    viewpoint: viewpointOf(header),
+  };
 }
 
 function fieldsOf(name: string, header: Record<string, string[]>): Field[] {
@@ -62,10 +73,17 @@ function fieldsOf(name: string, header: Record<string, string[]>): Field[] {
 /** The default, (0, 0, 0), says nothing. */
 function viewpointOf(header: Record<string, string[]>): Vector | null {
   const place = (header.VIEWPOINT ?? []).slice(0, 3).map(Number);
-  return place.length === 3 && place.every(Number.isFinite) && place.some((c) => c !== 0) ? (place as Vector) : null;
+  return place.length === 3 && place.every(Number.isFinite) && place.some((c) => c !== 0)
+    ? (place as Vector)
+    : null;
 }
 
-function rowColumns(name: string, bytes: Uint8Array<ArrayBuffer>, fields: Field[], count: number): Float32Array[] {
+function rowColumns(
+  name: string,
+  bytes: Uint8Array<ArrayBuffer>,
+  fields: Field[],
+  count: number,
+): Float32Array[] {
   const stride = fields.reduce((sum, field) => sum + sizeOf(field.type) * field.count, 0);
   checkLength(name, bytes.length, stride * count, `${count} points`);
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
@@ -78,7 +96,12 @@ function rowColumns(name: string, bytes: Uint8Array<ArrayBuffer>, fields: Field[
 }
 
 /** Compressed data hold one column behind the other. */
-function planeColumns(name: string, bytes: Uint8Array<ArrayBuffer>, fields: Field[], count: number): Float32Array[] {
+function planeColumns(
+  name: string,
+  bytes: Uint8Array<ArrayBuffer>,
+  fields: Field[],
+  count: number,
+): Float32Array[] {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const needed = fields.reduce((sum, field) => sum + sizeOf(field.type) * field.count * count, 0);
   checkLength(name, bytes.length, needed, `${count} points`);
@@ -93,7 +116,8 @@ function planeColumns(name: string, bytes: Uint8Array<ArrayBuffer>, fields: Fiel
 
 function asciiColumns(name: string, bytes: Uint8Array, fields: Field[], count: number): Float32Array[] {
   const lines = new TextDecoder("latin1").decode(bytes).trimEnd().split("\n");
-  if (lines.length < count) throw new FileError(`${name}: cut off: ${lines.length} of ${count} points are there`);
+  if (lines.length < count)
+    throw new FileError(`${name}: cut off: ${lines.length} of ${count} points are there`);
   const columns = fields.map((field) =>
     ["f4", "i1", "u1", "i2", "u2"].includes(field.type) ? new Float32Array(count) : new Float64Array(count),
   );

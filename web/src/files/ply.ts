@@ -86,7 +86,8 @@ function headerOf(name: string, bytes: Uint8Array): Header {
       format = words[1] as Header["format"];
     } else if (words[0] === "element") {
       const count = Number(words[2]);
-      if (!Number.isInteger(count) || count < 0) throw new FileError(`${name}: bad PLY header line "${line}"`);
+      if (!Number.isInteger(count) || count < 0)
+        throw new FileError(`${name}: bad PLY header line "${line}"`);
       elements.push({ name: words[1], count, properties: [] });
     } else if (words[0] === "comment" && words[2] === "viewpoint") {
       // As surfsig writes it: comment surfsig viewpoint X Y Z.
@@ -126,7 +127,13 @@ function binaryColumns(
   });
 }
 
-function afterElement(name: string, view: DataView, element: Element, start: number, little: boolean): number {
+function afterElement(
+  name: string,
+  view: DataView,
+  element: Element,
+  start: number,
+  little: boolean,
+): number {
   let at = start;
   for (let i = 0; i < element.count; i++) {
     for (const { type, length } of element.properties) {
@@ -152,7 +159,8 @@ function asciiColumns(
   const columns = vertices.properties.map(({ type }) => columnFor(type, vertices.count));
   for (let i = 0; i < vertices.count; i++) {
     const words = (lines[skipped + i] ?? "").trim().split(/\s+/);
-    if (words.length < columns.length) throw new FileError(`${name}: vertex ${i} of ${vertices.count} is cut off`);
+    if (words.length < columns.length)
+      throw new FileError(`${name}: vertex ${i} of ${vertices.count} is cut off`);
     for (let c = 0; c < columns.length; c++) {
       const value = Number(words[c]);
       if (Number.isNaN(value) && !/^[-+]?nan/i.test(words[c])) {

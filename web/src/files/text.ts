@@ -34,7 +34,8 @@ export function readText(name: string, bytes: Uint8Array): Columns {
     const line = lines[number];
     if (line.trim() === "" || COMMENT.test(line)) continue;
     const row = words(line);
-    if (row.length < 3) throw new FileError(`${name}: line ${number + 1} has ${row.length} numbers, not ${width}`);
+    if (row.length < 3)
+      throw new FileError(`${name}: line ${number + 1} has ${row.length} numbers, not ${width}`);
     for (let c = 0; c < width; c++) columns[c].push(Number(row[c] ?? NaN));
   }
   return { format: "text", names: namesOf(names, width, columns), columns };
@@ -46,7 +47,11 @@ function isNumber(word: string): boolean {
 
 function namesOf(header: string[] | null, width: number, columns: number[][]): string[] {
   const named = header?.map((word) => COORDINATES[word] ?? word);
-  if (named !== undefined && named.length === width && ["x", "y", "z"].every((axis) => named.includes(axis))) {
+  if (
+    named !== undefined &&
+    named.length === width &&
+    ["x", "y", "z"].every((axis) => named.includes(axis))
+  ) {
     return named;
   }
   const names = ["x", "y", "z", ...Array.from({ length: width - 3 }, (_, i) => `column ${i + 4}`)];

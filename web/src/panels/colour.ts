@@ -63,7 +63,10 @@ export class Legend {
     if (scale !== null && Number.isFinite(scale.low)) {
       const bar = h("div", { class: "bar" });
       bar.style.background = gradient(scale.kind);
-      const ends = scale.kind === "diverging" ? [scale.low, 0, scale.high] : [scale.low, (scale.low + scale.high) / 2, scale.high];
+      const ends =
+        scale.kind === "diverging"
+          ? [scale.low, 0, scale.high]
+          : [scale.low, (scale.low + scale.high) / 2, scale.high];
       children.push(bar, h("div", { class: "ends" }, ...ends.map((end) => h("span", {}, text(end, 3)))));
     }
     for (const { colour, text: words } of entries) {

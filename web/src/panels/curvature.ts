@@ -26,13 +26,20 @@ export function curvaturePanel(state: State, actions: Actions): Panel {
   const band = h("div", { class: "band", "aria-hidden": "true" });
   const auto = h("input", { type: "checkbox", id: "auto", onchange: () => actions.setAuto(auto.checked) });
   const advice = h("p", { class: "note" });
-  const suggestion = button("Suggested", () => actions.setRadius(suggestedRadius(state.spacing)), { class: "link" });
+  const suggestion = button("Suggested", () => actions.setRadius(suggestedRadius(state.spacing)), {
+    class: "link",
+  });
   const element = section(
     "curvature",
     "Curvature",
     h("div", { class: "row" }, h("label", { for: "radius" }, "Radius"), value),
     h("div", { class: "slider" }, band, slider),
-    h("div", { class: "row" }, h("label", { class: "check" }, auto, "auto: each point chooses its own"), suggestion),
+    h(
+      "div",
+      { class: "row" },
+      h("label", { class: "check" }, auto, "auto: each point chooses its own"),
+      suggestion,
+    ),
     advice,
   );
 
@@ -48,7 +55,9 @@ export function curvaturePanel(state: State, actions: Actions): Panel {
     slider.setAttribute("aria-valuetext", value.textContent);
   }
 
-  const [from, to] = [FEWEST_SPACINGS, MOST_SPACINGS].map((n) => Math.log(n / LEAST) / Math.log(MOST / LEAST));
+  const [from, to] = [FEWEST_SPACINGS, MOST_SPACINGS].map(
+    (n) => Math.log(n / LEAST) / Math.log(MOST / LEAST),
+  );
   band.style.left = `calc(8px + ${from} * (100% - 16px))`;
   band.style.width = `calc(${to - from} * (100% - 16px))`;
   return {
@@ -59,7 +68,8 @@ export function curvaturePanel(state: State, actions: Actions): Panel {
       auto.checked = state.auto;
       slider.disabled = state.auto;
       suggestion.disabled = state.auto;
-      if (document.activeElement !== slider || state.running === null) slider.value = String(stepOf(state.radius));
+      if (document.activeElement !== slider || state.running === null)
+        slider.value = String(stepOf(state.radius));
       show(state.radius);
       advice.textContent =
         state.oriented || state.computedRadius === null

@@ -34,23 +34,45 @@ export function pointPanel(state: State, actions: Actions): Panel {
       clear.hidden = first === null;
       if (first === null) {
         const more = state.computedRadius !== null ? " and see where else its surface occurs" : "";
-        body.replaceChildren(h("p", { class: "note" }, `Click a point to read its values${more}. Shift-click a second one to compare.`));
+        body.replaceChildren(
+          h(
+            "p",
+            { class: "note" },
+            `Click a point to read its values${more}. Shift-click a second one to compare.`,
+          ),
+        );
         return;
       }
-      const parts: Node[] = [h("h3", {}, h("b", { class: "mark" }, "A"), placeText(layer, first, state.spacing)), valuesOf(state, layer, first)];
+      const parts: Node[] = [
+        h("h3", {}, h("b", { class: "mark" }, "A"), placeText(layer, first, state.spacing)),
+        valuesOf(state, layer, first),
+      ];
       if (second !== null) {
         const zeta = column(layer, "zeta")[second] ?? NaN;
-        parts.push(h("h3", {}, h("b", { class: "mark second" }, "B"), placeText(layer, second, state.spacing)), valuesOf(state, layer, second));
+        parts.push(
+          h("h3", {}, h("b", { class: "mark second" }, "B"), placeText(layer, second, state.spacing)),
+          valuesOf(state, layer, second),
+        );
         const told = Number.isNaN(zeta) ? "not known" : `${zeta.toFixed(3)} (${similarityClass(zeta)})`;
-        parts.push(h("p", { class: "result", id: "zeta" }, h("span", {}, "zeta of A and B"), h("strong", {}, told)));
-        const apart = [0, 1, 2].map((axis) => layer.positions[3 * first + axis] - layer.positions[3 * second + axis]);
+        parts.push(
+          h("p", { class: "result", id: "zeta" }, h("span", {}, "zeta of A and B"), h("strong", {}, told)),
+        );
+        const apart = [0, 1, 2].map(
+          (axis) => layer.positions[3 * first + axis] - layer.positions[3 * second + axis],
+        );
         parts.push(facts([["Distance", `${text(Math.hypot(...apart))} ${unitText(state.unit, 1)}`]]));
       } else if (layer.columns.has("zeta")) {
         const zeta = column(layer, "zeta");
         let alike = 0;
         for (const value of zeta) if (value >= 0.9) alike++;
         const share = ((100 * alike) / zeta.length).toFixed(alike < 0.1 * zeta.length ? 1 : 0);
-        parts.push(h("p", { class: "note", id: "alike" }, `${share} % of the points have an optimally similar surface (zeta of 0.9 and above).`));
+        parts.push(
+          h(
+            "p",
+            { class: "note", id: "alike" },
+            `${share} % of the points have an optimally similar surface (zeta of 0.9 and above).`,
+          ),
+        );
       }
       body.replaceChildren(...parts);
     },
@@ -76,15 +98,25 @@ function valuesOf(state: State, layer: Layer, i: number): HTMLElement {
     rows.push(["K", `${withError(k1 * k2, Math.hypot(k2 * s1, k1 * s2))} ${square}`]);
     rows.push(["Radii of curvature", radii(k1, s1, k2, s2, unitText(state.unit, 1))]);
     if (layer.columns.has("count")) rows.push(["Points in the ball", count(value("count"))]);
-    if (layer.columns.has("radius")) rows.push(["Radius of the ball", `${text(value("radius"))} ${unitText(state.unit, 1)}`]);
+    if (layer.columns.has("radius"))
+      rows.push(["Radius of the ball", `${text(value("radius"))} ${unitText(state.unit, 1)}`]);
     const status = STATUSES[value("status")] ?? "";
     if (status !== "") rows.push(["Status", status]);
   }
   if (layer.normals !== null) {
     rows.push(["Normal", [0, 1, 2].map((axis) => text(layer.normals?.[3 * i + axis] ?? NaN, 3)).join(", ")]);
   }
-  if (layer.labels !== null) rows.push([layer.labelName, layer.labels[i] >= 0 ? String(layer.labels[i]) : "none"]);
-  const told = new Set(["k1", "k2", "k1_std", "k2_std", "mean_curvature", "mean_curvature_std", "gaussian_curvature"]);
+  if (layer.labels !== null)
+    rows.push([layer.labelName, layer.labels[i] >= 0 ? String(layer.labels[i]) : "none"]);
+  const told = new Set([
+    "k1",
+    "k2",
+    "k1_std",
+    "k2_std",
+    "mean_curvature",
+    "mean_curvature_std",
+    "gaussian_curvature",
+  ]);
   for (const name of ["count", "radius", "status", "zeta", "residual"]) told.add(name);
   for (const name of layer.columns.keys()) {
     if (!told.has(name) && rows.length < 16) rows.push([name.replaceAll("_", " "), text(value(name), 5)]);

@@ -6,7 +6,12 @@ import type { Actions, Panel } from "./actions.js";
 import { h, section } from "./dom.js";
 import { chosenBy, dot, markChosen } from "./surfaces.js";
 
-export function reportPanel(report: Report, state: State, actions: Actions, setStage: (share: number) => void): Panel {
+export function reportPanel(
+  report: Report,
+  state: State,
+  actions: Actions,
+  setStage: (share: number) => void,
+): Panel {
   const staged = report.layers.some(({ stage, transform }) => stage !== null || transform !== null);
   const slider = h("input", {
     type: "range",
@@ -37,9 +42,12 @@ export function reportPanel(report: Report, state: State, actions: Actions, setS
 
 function tableOf(report: Report, actions: Actions): HTMLTableElement {
   const labelled = new Set<number>();
-  for (const { labels } of report.layers) if (labels !== null) for (const label of labels) labelled.add(label);
+  for (const { labels } of report.layers)
+    if (labels !== null) for (const label of labels) labelled.add(label);
   // Numbers stand on the right, words on the left.
-  const isNumber = report.header.map((_, c) => report.rows.every((row) => !/[a-z]{3,}/i.test(row[c] ?? "")) && c > 0);
+  const isNumber = report.header.map(
+    (_, c) => report.rows.every((row) => !/[a-z]{3,}/i.test(row[c] ?? "")) && c > 0,
+  );
   const rows = report.rows.map((words, number) => {
     const cells = words.map((word, c) => h("td", { class: isNumber[c] ? "number" : undefined }, word));
     const row = h("tr", {}, ...cells);
@@ -48,7 +56,17 @@ function tableOf(report: Report, actions: Actions): HTMLTableElement {
     return chosenBy(row, number, actions);
   });
   const head = report.header.some((word) => word !== "")
-    ? h("thead", {}, h("tr", {}, ...report.header.map((word, c) => h("th", { scope: "col", class: isNumber[c] ? "number" : undefined }, word))))
+    ? h(
+        "thead",
+        {},
+        h(
+          "tr",
+          {},
+          ...report.header.map((word, c) =>
+            h("th", { scope: "col", class: isNumber[c] ? "number" : undefined }, word),
+          ),
+        ),
+      )
     : null;
   return h("table", { id: "report-table" }, head, h("tbody", {}, ...rows));
 }

@@ -13,14 +13,17 @@ const KINDS: [SaveKind, string, string][] = [
 ];
 
 export function savePanel(state: State, actions: Actions): Panel {
-  const buttons = KINDS.map(([kind, name, title]) => button(name, () => actions.save(kind), { id: `save-${kind}`, title }));
+  const buttons = KINDS.map(([kind, name, title]) =>
+    button(name, () => actions.save(kind), { id: `save-${kind}`, title }),
+  );
   const element = section("save", "Save", h("div", { class: "buttons" }, ...buttons));
   return {
     element,
     update(): void {
       element.hidden = state.layer === null;
       const none = state.found === null || state.found.surfaces.length === 0;
-      for (const [i, [kind]] of KINDS.entries()) buttons[i].hidden = none && (kind === "csv" || kind === "json");
+      for (const [i, [kind]] of KINDS.entries())
+        buttons[i].hidden = none && (kind === "csv" || kind === "json");
     },
   };
 }

@@ -6,7 +6,13 @@ import { boundsOf } from "../view/layer.js";
 import type { Actions, Panel } from "./actions.js";
 import { facts, h, section } from "./dom.js";
 
-const UNIT_NAMES: Record<Unit, string> = { unit: "not known", m: "metres", mm: "millimetres", cm: "centimetres", ft: "feet" };
+const UNIT_NAMES: Record<Unit, string> = {
+  unit: "not known",
+  m: "metres",
+  mm: "millimetres",
+  cm: "centimetres",
+  ft: "feet",
+};
 
 export function scanPanel(state: State, actions: Actions): Panel {
   const body = h("div");
@@ -34,14 +40,23 @@ export function scanPanel(state: State, actions: Actions): Panel {
       const rows: [string, string][] = [
         ["Name", layer.name],
         ["Format", state.format],
-        ["Points", count(layer.count) + (state.leftOut > 0 ? `, and ${count(state.leftOut)} not finite` : "")],
+        [
+          "Points",
+          count(layer.count) + (state.leftOut > 0 ? `, and ${count(state.leftOut)} not finite` : ""),
+        ],
         ["Size", state.unit === "unit" ? size : `${size} ${unit}`],
       ];
       if (state.spacing > 0) {
         // Points at random are apart by sqrt(ln 2 / (pi density)) in the median.
         const density = Math.LN2 / (Math.PI * state.spacing ** 2);
-        rows.push(["Spacing", `${text(state.spacing)}${state.unit === "unit" ? "" : ` ${unit}`} to the nearest point (median)`]);
-        rows.push(["Density", `about ${text(density, 2)} per ${state.unit === "unit" ? "square unit" : `${unit}²`}`]);
+        rows.push([
+          "Spacing",
+          `${text(state.spacing)}${state.unit === "unit" ? "" : ` ${unit}`} to the nearest point (median)`,
+        ]);
+        rows.push([
+          "Density",
+          `about ${text(density, 2)} per ${state.unit === "unit" ? "square unit" : `${unit}²`}`,
+        ]);
       }
       body.replaceChildren(facts(rows.filter(([, value]) => value !== "")));
     },

@@ -47,8 +47,12 @@ export function surfacesPanel(state: State, actions: Actions): Panel {
         const { angle, distance, told: what } = relation(a, b);
         const rows: [string, string][] = [];
         if (angle !== null) rows.push(["Angle", `${text(angle, 4)}°`]);
-        if (distance !== null) rows.push(["Distance", `${text(distance, 4)} ${unitText(state.unit, 1)} ${what}`]);
-        between.replaceChildren(h("h3", {}, `Surfaces ${state.chosen[0]} and ${state.chosen[1]}`), facts(rows));
+        if (distance !== null)
+          rows.push(["Distance", `${text(distance, 4)} ${unitText(state.unit, 1)} ${what}`]);
+        between.replaceChildren(
+          h("h3", {}, `Surfaces ${state.chosen[0]} and ${state.chosen[1]}`),
+          facts(rows),
+        );
       }
     },
   };
@@ -89,13 +93,23 @@ function rowsOf(state: State, actions: Actions): HTMLTableElement {
   const head = ["", "Kind", `Radius${unit}`, "95 %", "Points"];
   const rows = (state.found?.surfaces ?? []).map((surface, number) => {
     const { radius, range } = sizeText(surface);
-    const cells = [surface.kind, radius, range, count(surface.count)].map((words, c) => h("td", { class: c > 0 ? "number" : undefined }, words));
+    const cells = [surface.kind, radius, range, count(surface.count)].map((words, c) =>
+      h("td", { class: c > 0 ? "number" : undefined }, words),
+    );
     return chosenBy(h("tr", {}, h("td", {}, dot(number), String(number)), ...cells), number, actions);
   });
   return h(
     "table",
     { id: "surface-table" },
-    h("thead", {}, h("tr", {}, ...head.map((words, c) => h("th", { scope: "col", class: c > 1 ? "number" : undefined }, words)))),
+    h(
+      "thead",
+      {},
+      h(
+        "tr",
+        {},
+        ...head.map((words, c) => h("th", { scope: "col", class: c > 1 ? "number" : undefined }, words)),
+      ),
+    ),
     h("tbody", {}, ...rows),
   );
 }

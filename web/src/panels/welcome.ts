@@ -37,7 +37,12 @@ export function welcome(actions: Actions, choose: () => void): HTMLElement {
       "div",
       { class: "samples" },
       ...SAMPLES.map(({ id, title, told }) =>
-        h("button", { type: "button", "data-sample": id, onclick: () => actions.openSample(id) }, h("strong", {}, title), h("span", {}, told)),
+        h(
+          "button",
+          { type: "button", "data-sample": id, onclick: () => actions.openSample(id) },
+          h("strong", {}, title),
+          h("span", {}, told),
+        ),
       ),
     ),
     h("p", { class: "note" }, "Everything is computed in this page. Nothing leaves this machine."),

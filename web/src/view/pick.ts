@@ -73,7 +73,8 @@ export function inView(
   let count = 0;
   for (let point = 0; point < layer.layer.count; point++) {
     project(point, seen);
-    if (seen.z > 0 && seen.x >= 0 && seen.x <= width && seen.y >= 0 && seen.y <= height) numbers[count++] = point;
+    if (seen.z > 0 && seen.x >= 0 && seen.x <= width && seen.y >= 0 && seen.y <= height)
+      numbers[count++] = point;
   }
   return numbers.slice(0, count);
 }

@@ -106,7 +106,10 @@ export class PointLayer {
       // R (offset + origin) + t, with the origins taken off in float64.
       const moved = [0, 1, 2].map(
         (r) =>
-          t[4 * r] * origin[0] + t[4 * r + 1] * origin[1] + t[4 * r + 2] * origin[2] + t[4 * r + 3] -
+          t[4 * r] * origin[0] +
+          t[4 * r + 1] * origin[1] +
+          t[4 * r + 2] * origin[2] +
+          t[4 * r + 3] -
           this.sceneOrigin[r],
       );
       const rotation = new Matrix4().set(
@@ -116,7 +119,10 @@ export class PointLayer {
       const turned = new Quaternion().slerp(new Quaternion().setFromRotationMatrix(rotation), share);
       // The centre moves along a straight line, and the points turn about it.
       const from = centre.clone().add(offset);
-      const to = centre.clone().applyMatrix4(rotation).add(new Vector3(...(moved as Vector)));
+      const to = centre
+        .clone()
+        .applyMatrix4(rotation)
+        .add(new Vector3(...(moved as Vector)));
       const at = from.lerp(to, share);
       matrix.makeRotationFromQuaternion(turned);
       matrix.setPosition(at.sub(centre.applyQuaternion(turned)));
@@ -211,7 +217,8 @@ function blockOrder(layer: Layer, low: Vector, high: Vector): { order: Uint32Arr
   const next = starts.slice();
   const order = new Uint32Array(count);
   for (let i = 0; i < count; i++) order[next[cellNumbers[i]]++] = i;
-  for (let cell = 0; cell + 1 < starts.length; cell++) shuffle(order.subarray(starts[cell], starts[cell + 1]));
+  for (let cell = 0; cell + 1 < starts.length; cell++)
+    shuffle(order.subarray(starts[cell], starts[cell + 1]));
   return { order, starts };
 }
 

@@ -30,7 +30,24 @@ export function drawnTrajectory({ positions, covariances }: Trajectory, origin: 
     const mesh = new Mesh(sphere, material);
     mesh.matrixAutoUpdate = false;
     const [r, at] = [root, offsets[pose]];
-    mesh.matrix = new Matrix4().set(r[0], r[1], r[2], at[0], r[3], r[4], r[5], at[1], r[6], r[7], r[8], at[2], 0, 0, 0, 1);
+    mesh.matrix = new Matrix4().set(
+      r[0],
+      r[1],
+      r[2],
+      at[0],
+      r[3],
+      r[4],
+      r[5],
+      at[1],
+      r[6],
+      r[7],
+      r[8],
+      at[2],
+      0,
+      0,
+      0,
+      1,
+    );
     group.add(mesh);
   }
   return group;

@@ -34,6 +34,8 @@ const MOVING_LEAST = 60_000;
 const [SLOW_FRAME, FAST_FRAME] = [40, 18];
 /** Darkness of an edge, per power of two by which its other side is nearer. */
 const EYE_DOME = 18;
+/** Width of the view, in widths of what it shows. */
+const MARGIN = 1.06;
 /** Milliseconds without a motion after which all are drawn. */
 const REST = 180;
 
@@ -163,9 +165,7 @@ export class Viewer {
     for (const overlay of this.overlays) box.expandByObject(overlay);
     if (box.isEmpty()) return;
     this.sphere = box.getBoundingSphere(new Sphere());
-    const halfAngle = (this.camera.fov * Math.PI) / 360;
-    const narrow = Math.atan(Math.tan(halfAngle) * Math.min(1, this.camera.aspect));
-    const distance = (0.86 * this.sphere.radius) / Math.sin(narrow);
+    const distance = this.distanceFor(box, new Vector3(...from).normalize());
     this.controls.target.copy(this.sphere.center);
     this.camera.position
       .set(...from)
@@ -176,6 +176,26 @@ export class Viewer {
     this.controls.minDistance = 1e-4 * this.sphere.radius;
     this.controls.update();
     this.moved();
+  }
+
+  /** How far away in a direction from the middle of a box all of its corners are in view. */
+  private distanceFor(box: Box3, towards: Vector3): number {
+    const up = Math.tan((this.camera.fov * Math.PI) / 360);
+    const right = new Vector3().crossVectors(this.camera.up, towards).normalize();
+    const above = new Vector3().crossVectors(towards, right);
+    const half = box.getSize(new Vector3()).multiplyScalar(0.5);
+    let distance = 1e-6;
+    for (let corner = 0; corner < 8; corner++) {
+      const at = new Vector3(
+        ...[1, 2, 4].map((bit, axis) => (corner & bit ? 1 : -1) * half.getComponent(axis)),
+      );
+      const across = Math.max(
+        Math.abs(at.dot(right)) / (up * this.camera.aspect),
+        Math.abs(at.dot(above)) / up,
+      );
+      distance = Math.max(distance, at.dot(towards) + MARGIN * across);
+    }
+    return distance;
   }
 
   get state(): ViewState {
@@ -267,7 +287,10 @@ export class Viewer {
     this.renderer.render(this.scene, this.camera);
     this.renderer.setRenderTarget(null);
     this.renderer.render(this.screen, this.screenCamera);
-    this.onDrawn(drawn, layers.reduce((sum, { layer }) => sum + layer.count, 0));
+    this.onDrawn(
+      drawn,
+      layers.reduce((sum, { layer }) => sum + layer.count, 0),
+    );
     if (moving) setTimeout(() => this.render(), REST + 10);
   }
 
@@ -275,7 +298,11 @@ export class Viewer {
   private setDepthRange(): void {
     const distance = this.camera.position.distanceTo(this.sphere.center);
     const far = distance + 1.5 * this.sphere.radius;
-    const near = Math.max(distance - 1.5 * this.sphere.radius, 2e-3 * this.camera.position.distanceTo(this.controls.target), 1e-5 * far);
+    const near = Math.max(
+      distance - 1.5 * this.sphere.radius,
+      2e-3 * this.camera.position.distanceTo(this.controls.target),
+      1e-5 * far,
+    );
     this.camera.near = near;
     this.camera.far = far;
     this.camera.updateProjectionMatrix();
@@ -287,7 +314,10 @@ export class Viewer {
   picture(): Promise<Blob> {
     this.draw(performance.now() + REST);
     return new Promise((resolve, reject) => {
-      this.canvas.toBlob((blob) => (blob === null ? reject(new Error("no picture")) : resolve(blob)), "image/png");
+      this.canvas.toBlob(
+        (blob) => (blob === null ? reject(new Error("no picture")) : resolve(blob)),
+        "image/png",
+      );
     });
   }
 }
