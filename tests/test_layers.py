@@ -45,7 +45,7 @@ PYTHON_EXCEPTIONS = {
 }
 
 RUST_FLOORS = (
-    ("error",),
+    ("error", "multiply_add"),
     (
         "statistics",
         "geometry",

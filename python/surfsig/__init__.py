@@ -23,6 +23,7 @@ from surfsig._surfsig import (
     __version__,
 )
 from surfsig.alignment.free_directions import FreeDirection
+from surfsig.browser import show
 from surfsig.clean import crop, downsample, remove_outliers
 from surfsig.coordinate_system import CoordinateSystem, GeoKeys
 from surfsig.curvature import extract, extract_radii
@@ -73,7 +74,6 @@ from surfsig.shapes import (
     fit_sphere,
     fit_torus,
 )
-from surfsig.browser import show
 from surfsig.signature_similarity import flip_signatures, similarity, similarity_class, similarity_matrix
 from surfsig.surfaces import (
     PipeJoint,

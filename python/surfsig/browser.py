@@ -8,26 +8,24 @@ import webbrowser
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from numpy.typing import ArrayLike
-
 from surfsig.page import serve_cloud, write_page
 from surfsig.point_cloud import PointCloud
 
 
 @runtime_checkable
-class HasPage(Protocol):
+class _HasPage(Protocol):
     """A result that makes a page of itself."""
 
     def to_html(self, *, title: str = ...) -> str:
         """Make the page."""
 
 
-def show(shown: HasPage | PointCloud | ArrayLike, *, title: str | None = None, browser: bool = True) -> str:
+def show(shown: Any, *, title: str | None = None, browser: bool = True) -> str:
     """Show a cloud, or a result, in the browser.
 
-    A cloud is shown in the page that computes: curvature at any radius, where else a surface occurs, surfaces with
-    their sizes. It is served on 127.0.0.1 as long as this process runs. A result (`Extraction`, `Surfaces`,
-    `Instances`, `Odometry`) is shown as its report, a file.
+    A cloud is shown in the page that computes: curvature at any radius, where else a surface occurs,
+    surfaces with their sizes. It is served on 127.0.0.1 as long as this process runs. A result
+    (`Extraction`, `Surfaces`, `Instances`, `Odometry`) is shown as its report, a file.
 
     Parameters
     ----------
@@ -47,7 +45,7 @@ def show(shown: HasPage | PointCloud | ArrayLike, *, title: str | None = None, b
     InvalidInputError
         If it is neither a result that has a page nor a cloud.
     """
-    if isinstance(shown, HasPage):
+    if isinstance(shown, _HasPage):
         name = title or type(shown).__name__
         folder = Path(tempfile.mkdtemp(prefix="surfsig-"))
         path = folder / "page.html"

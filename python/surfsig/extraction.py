@@ -233,6 +233,10 @@ class Extraction:
         ----------
         title
             The page's.
+
+        Returns
+        -------
+        The document, which needs no network.
         """
         return report_html(self, title)
 

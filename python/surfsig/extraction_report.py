@@ -42,11 +42,10 @@ def report_html(
     own_radii = not isinstance(extraction.radius, float)
     if own_radii:
         columns["radius"] = extraction.radius
-    layer = Layer("scan", extraction.points, normals=extraction.normals, columns=columns)
+    points = np.asarray(extraction.points, np.float64)
+    layer = Layer("scan", points, normals=extraction.normals, columns=columns)
     radius = "a radius of their own" if own_radii else f"the radius {extraction.radius:.4g}"
     counts = ", ".join(f"{name.replace('_', ' ')}: {n:,}" for name, n in extraction.status_counts().items())
-    side = (
-        "" if extraction.oriented else " No viewpoint is known: the sign of curvature is a convention."
-    )
+    side = "" if extraction.oriented else " No viewpoint is known: the sign of curvature is a convention."
     text = f"Curvature of {len(extraction):,} places with {radius}, per unit of length; {counts}.{side}"
     return page_html(title, text, [layer], quantity="mean_curvature", most_points=most_points)

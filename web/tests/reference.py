@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,11 +17,12 @@ import surfsig
 def curvature(path: str, radius: str, query: str | None = None) -> dict[str, Any]:
     """Extract the saved points again, and give the largest differences, in units of max(|k|, 1 / radius).
 
-    Without fused multiply-adds a point on a ball's rim can be on its other side: points with such balls are counted
-    apart, and so are those at borders, whose fits are determined less well. Those that do not converge are left out.
+    Without fused multiply-adds a point on a ball's rim can be on its other side: points with such balls are
+    counted apart, and so are those at borders, whose fits are determined less well. Those that do not
+    converge are left out.
     """
     cloud = surfsig.read(path)
-    how = "auto" if radius == "auto" else float(radius)
+    how: float | Literal["auto"] = "auto" if radius == "auto" else float(radius)
     points = surfsig.PointCloud(cloud.offsets.astype(np.float32), viewpoint=cloud.viewpoint)
     found = surfsig.extract(points, how)
     fields = cloud.fields
@@ -34,7 +36,9 @@ def curvature(path: str, radius: str, query: str | None = None) -> dict[str, Any
         missing = (np.isnan(ours) != np.isnan(fields[name])) & same
         differences = np.abs(ours - fields[name]) / np.maximum(np.abs(ours), scale)
         result[name] = None if missing.any() else float(np.nanmax(differences[same]))
-        result["one_sided"] = max(result.get("one_sided", 0.0), float(np.nanmax(differences[one_sided], initial=0.0)))
+        result["one_sided"] = max(
+            result.get("one_sided", 0.0), float(np.nanmax(differences[one_sided], initial=0.0))
+        )
     normals = np.column_stack([fields[axis] for axis in ("nx", "ny", "nz")])
     result["normals"] = float(np.nanmax(np.abs(normals - found.normals)[same]))
     result["statuses_differ"] = int((found.status != fields["status"]).sum())
@@ -54,7 +58,7 @@ def surfaces(path: str, table: str) -> dict[str, Any]:
         rows = list(csv.DictReader(file))
     radii = [(float(row["radius"] or "nan"), float(row["radius_high"] or "nan")) for row in rows]
     pairs = [(radius, high, surface) for (radius, high), surface in zip(radii, found, strict=False)]
-    ends = [(high, surface.radius_interval[1]) for _, high, surface in pairs if surface.radius is not None]
+    ends = [(high, surface.interval[1]) for _, high, surface in pairs if surface.radius is not None]
     return {
         "labels_differ": int((found.labels != cloud.fields["surface"]).sum()),
         "kinds": [row["kind"] for row in rows],
@@ -70,7 +74,7 @@ def files(folder: str) -> dict[str, Any]:
     rng = np.random.default_rng(5)
     points = rng.uniform(-1, 1, (400, 3)).astype(np.float32)
     points[:, 2] = 0.3 * points[:, 0] ** 2
-    cloud = surfsig.PointCloud(points, viewpoint=(0.0, 0.0, 5.0))
+    cloud = surfsig.PointCloud(points, viewpoint=np.array([0.0, 0.0, 5.0]))
     made = Path(folder)
     for ending in ("ply", "pcd", "las", "laz", "xyz", "csv"):
         surfsig.write(made / f"cloud.{ending}", cloud)
@@ -81,7 +85,7 @@ def files(folder: str) -> dict[str, Any]:
     (made / "ascii.ply").write_text(header + text + "\n")
     pcd = "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 400\nHEIGHT 1\n"
     (made / "ascii.pcd").write_text(f"{pcd}VIEWPOINT 0 0 5 1 0 0 0\nPOINTS 400\nDATA ascii\n{text}\n")
-    far = surfsig.PointCloud(points.astype(np.float64) + [400_000.0, 5_600_000.0, 300.0])
+    far = surfsig.PointCloud(points + np.array([400_000.0, 5_600_000.0, 300.0]))
     surfsig.write(made / "far.ply", far)
     whole = (made / "cloud.ply").read_bytes()
     broken = {
@@ -119,7 +123,7 @@ def report(path: str) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    command = {
+    command: dict[str, Callable[..., dict[str, Any]]] = {
         "curvature": curvature,
         "surfaces": surfaces,
         "files": files,

@@ -36,7 +36,9 @@ if TYPE_CHECKING:
     "--distance", type=float, help="To partners in the map, at most.  [default: by how well motion is known]"
 )
 @click.option("--map-range", type=float, help="Of the map about the sensor.  [default: by the scans]")
-@click.option("--report", type=CLOUD, metavar="FILE.html", help="Write a page with the trajectory and the map.")
+@click.option(
+    "--report", type=CLOUD, metavar="FILE.html", help="Write a page with the trajectory and the map."
+)
 @input_options
 @threads_option
 @json_option

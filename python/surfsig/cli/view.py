@@ -15,7 +15,9 @@ from surfsig.cli.options import CLOUD, input_options
 
 @click.command("view", no_args_is_help=True)
 @click.argument("file", type=CLOUD)
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Where to serve.  [default: any free one]")
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, help="Where to serve.  [default: any free one]"
+)
 @click.option("--no-browser", is_flag=True, help="Only serve, and say where.")
 @input_options
 def view_command(file: Path, port: int, no_browser: bool, **reading: Any) -> None:

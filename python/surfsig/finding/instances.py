@@ -164,6 +164,10 @@ class Instances:
         ----------
         title
             The page's.
+
+        Returns
+        -------
+        The document, which needs no network.
         """
         return self._page(title, MOST_POINTS)
 
@@ -178,7 +182,9 @@ class Instances:
             points = self.placed(number).points
             labels = np.full(len(points), number)
             layers.append(
-                Layer(f"{number} {instance.name}", points, labels=labels, label_name="Instance", stage="after")
+                Layer(
+                    f"{number} {instance.name}", points, labels=labels, label_name="Instance", stage="after"
+                )
             )
         text = f"{self.summary()}. A click on a point or a row shows the instance."
         return page_html(

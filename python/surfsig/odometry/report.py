@@ -34,7 +34,7 @@ def report_html(
     most_points
         Points that the page holds, of all scans together.
     """
-    known = np.isfinite(found.poses).all(axis=(1, 2))
+    known = np.asarray(np.isfinite(found.poses).all(axis=(1, 2)))
     positions = np.where(known[:, None], found.poses[:, :3, 3], np.nan)
     rotations = found.poses[:, :3, :3]
     # The covariance is in the scan's own frame; its translations turn with the scan.

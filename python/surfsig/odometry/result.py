@@ -80,6 +80,10 @@ class Odometry:
         ----------
         title
             The page's.
+
+        Returns
+        -------
+        The document, which needs no network.
         """
         return report_html(self, None, title)
 

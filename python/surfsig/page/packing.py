@@ -1,4 +1,4 @@
-"""Points in few bytes: coordinates in 16 bits along a space-filling curve, other numbers as precise as they are looked at.
+"""Points in few bytes: coordinates in 16 bits along a space-filling curve, other numbers with 2 to 3 digits.
 
 `web/src/report_data.ts` reads them.
 """
@@ -29,7 +29,7 @@ MORTON_BITS = 10
 """Bits of each axis in the order of the points: neighbours follow each other, which compresses well."""
 
 HALF_RANGE = 100.0
-"""What the 99th percentile of a column's sizes is scaled to: half precision has 11 bits from 6e-5 to 65,504."""
+"""What the 99th percentile of a column's sizes is scaled to: it has 11 bits from 6e-5 to 65,504."""
 
 ERROR_COLUMNS = ("_std", "residual")
 """Ends of the names of columns that are positive and need two digits."""
@@ -77,7 +77,9 @@ class Packer:
         """Give all arrays, compressed, in base64."""
         return base64.b64encode(gzip.compress(b"".join(self._parts), mtime=0)).decode()
 
-    def _add(self, kind: str, parts: Iterable[NDArray[Any]], low: float = 0.0, step: float = 1.0) -> dict[str, Any]:
+    def _add(
+        self, kind: str, parts: Iterable[NDArray[Any]], low: float = 0.0, step: float = 1.0
+    ) -> dict[str, Any]:
         start = self._length
         for part in parts:
             content = np.ascontiguousarray(part).tobytes()

@@ -18,8 +18,8 @@ HOST = "127.0.0.1"
 def serve_cloud(cloud: PointCloud, name: str, port: int = 0) -> PageServer:
     """Make a server of the page with a cloud, which begins with `serve_forever()`.
 
-    It listens at 127.0.0.1, at a path that cannot be guessed, and answers only what is asked of that host: another
-    page in the same browser cannot read the cloud.
+    It listens at 127.0.0.1, at a path that cannot be guessed, and answers only what is asked of that host:
+    another page in the same browser cannot read the cloud.
 
     Parameters
     ----------

@@ -170,7 +170,8 @@ class Registration:
     ) -> None:
         """Write one HTML page: both clouds before and after, in a view that turns, and what was found.
 
-        A slider moves the source. The page needs no network. Of more than a million points a million are drawn.
+        A slider moves the source. The page needs no network. Of more than a million points a million are
+        drawn.
 
         Parameters
         ----------

@@ -249,8 +249,9 @@ class Surfaces:
     def write_report(self, path: str | Path, *, title: str = "Surfaces") -> None:
         """Write one HTML page: the points coloured by surface, in a view that turns, and a table with errors.
 
-        Coloured by their distance from the surface, they have a scale that is symmetric about 0 and as wide as
-        95 % of the distances. The page needs no network. Of more than a million points a million are drawn.
+        Coloured by their distance from the surface, they have a scale that is symmetric about 0 and as wide
+        as 95 % of the distances. The page needs no network. Of more than a million points a million are
+        drawn.
 
         Parameters
         ----------
@@ -268,6 +269,10 @@ class Surfaces:
         ----------
         title
             The page's.
+
+        Returns
+        -------
+        The document, which needs no network.
         """
         return report_html(self, title)
 

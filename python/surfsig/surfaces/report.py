@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def report_html(found: Surfaces, title: str, most_points: int = MOST_POINTS) -> str:
-    """Make the page: the points coloured by surface or by their distance from it, and the table of the surfaces.
+    """Make the page: the points coloured by surface or by their distance from it, and the surfaces' table.
 
     Parameters
     ----------

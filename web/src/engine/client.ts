@@ -32,7 +32,8 @@ export class Engine {
     worker.onmessage = (event: MessageEvent<Answer>) => this.answered(event.data);
     worker.onerror = (event) => this.fail(new Error(event.message || "the worker stopped"));
     this.worker = worker;
-    void this.ask({ kind: "start", engine: this.wasm });
+    // Whatever is asked next fails with the reason.
+    this.ask({ kind: "start", engine: this.wasm }).catch(() => undefined);
     return worker;
   }
 

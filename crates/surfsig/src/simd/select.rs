@@ -116,9 +116,9 @@ pub(crate) struct Place {
 
 /// How a row's offsets become offsets from the ball's centre in units of its radius: `scale * offset + shift`.
 #[derive(Clone, Copy)]
-struct Placement {
-    scale: f32,
-    shift: [f32; 3],
+pub(super) struct Placement {
+    pub(super) scale: f32,
+    pub(super) shift: [f32; 3],
 }
 
 /// Appends members of the ball to `block`, from `place` on, until the block holds [`BLOCK`] of them or
@@ -133,7 +133,14 @@ pub(crate) fn gather<const RANKS: bool>(
     place: &mut Place,
 ) -> bool {
     match set.0 {
+        #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
         Kind::Baseline => gather_by(rows, windows, ball, block, place, select_baseline::<RANKS>),
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+        Kind::Baseline => gather_by(rows, windows, ball, block, place, |rows, ranks, placement, block| {
+            // SAFETY: `gather_by` checks that the rows are readable for 16 slots beyond the ranks, of which it hands on
+            // at most `PIECE`, and only while the block holds less than `BLOCK`.
+            unsafe { super::select_wasm::select_simd128::<RANKS>(rows, ranks, placement, block) }
+        }),
         // SAFETY: the value of `set` proves AVX2, FMA and POPCNT.
         #[cfg(target_arch = "x86_64")]
         Kind::Avx2 => unsafe { x86::gather_avx2::<RANKS>(rows, windows, ball, block, place) },
@@ -182,6 +189,7 @@ fn gather_by(
 
 /// Eight distances at a time, which the compiler vectorises; then a store of every point, of which
 /// the next overwrites those that are outside.
+#[cfg_attr(all(target_arch = "wasm32", target_feature = "simd128"), allow(dead_code))]
 #[inline(always)]
 fn select_baseline<const RANKS: bool>(
     rows: Rows<'_>,
