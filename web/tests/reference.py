@@ -103,11 +103,17 @@ def files(folder: str) -> dict[str, Any]:
     return {"broken": list(broken), "sum": points.sum(0, dtype=np.float64).tolist()}
 
 
-def saved_points(path: str) -> dict[str, Any]:
-    """Read a saved file back."""
-    cloud = surfsig.read(path)
-    viewpoint = None if cloud.viewpoint is None else list(cloud.viewpoint)
-    return {"points": len(cloud), "sum": cloud.points.sum(0).tolist(), "viewpoint": viewpoint}
+def saved_points(*paths: str) -> list[dict[str, Any]]:
+    """Read saved files back."""
+    clouds = [surfsig.read(path) for path in paths]
+    return [
+        {
+            "points": len(cloud),
+            "sum": cloud.points.sum(0).tolist(),
+            "viewpoint": None if cloud.viewpoint is None else list(cloud.viewpoint),
+        }
+        for cloud in clouds
+    ]
 
 
 def report(path: str) -> dict[str, Any]:
@@ -123,7 +129,7 @@ def report(path: str) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    command: dict[str, Callable[..., dict[str, Any]]] = {
+    command: dict[str, Callable[..., Any]] = {
         "curvature": curvature,
         "surfaces": surfaces,
         "files": files,
