@@ -56,15 +56,13 @@ def surfaces(path: str, table: str) -> dict[str, Any]:
     found = surfsig.find_surfaces(surfsig.PointCloud(cloud.offsets.astype(np.float32)))
     with open(table, newline="") as file:
         rows = list(csv.DictReader(file))
-    radii = [(float(row["radius"] or "nan"), float(row["radius_high"] or "nan")) for row in rows]
-    pairs = [(radius, high, surface) for (radius, high), surface in zip(radii, found, strict=False)]
-    ends = [(high, surface.interval[1]) for _, high, surface in pairs if surface.radius is not None]
+    with_radius = [(row, s) for row, s in zip(rows, found, strict=False) if row["radius"]]
     return {
         "labels_differ": int((found.labels != cloud.fields["surface"]).sum()),
         "kinds": [row["kind"] for row in rows],
         "python_kinds": [surface.kind for surface in found],
-        "radius": max(abs(radius / s.radius - 1) for radius, _, s in pairs if s.radius is not None),
-        "interval": max(abs(high / end - 1) for high, end in ends),
+        "radius": max(abs(float(row["radius"]) / s.radius - 1) for row, s in with_radius),
+        "interval": max(abs(float(row["radius_high"]) / s.interval[1] - 1) for row, s in with_radius),
         "counts": [int(row["points"]) for row in rows] == [surface.count for surface in found],
     }
 

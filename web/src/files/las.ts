@@ -74,7 +74,7 @@ async function decompressed(
     return points;
   } catch (error) {
     const reason = error instanceof Error ? `: ${error.message}` : "";
-    throw new FileError(`${name}: the LAZ file's points cannot be decompressed${reason}`);
+    throw new FileError(`${name}: the LAZ file's points cannot be decompressed${reason}; is it cut off?`);
   } finally {
     reader.delete();
     module._free(file);
