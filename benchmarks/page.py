@@ -83,6 +83,7 @@ def size_rows(folder: Path) -> list[tuple[str, str]]:
     points = bumps(DRAWN)
     file, report = folder / "scan.ply", folder / "report.html"
     surfsig.write(file, points)
+    load = os.getloadavg()[0]
     seen = run_node("first_picture.mjs", file)
     surfsig.extract(points, radius_for(DRAWN)).write_report(report)
     page = viewer().encode()
@@ -92,6 +93,7 @@ def size_rows(folder: Path) -> list[tuple[str, str]]:
         (f"report of an extraction of {DRAWN:,} points (MB)", f"{report.stat().st_size / 1e6:.2f}"),
         (f"first picture of a PLY of {DRAWN:,} points (s, by the clock)", f"{seen['picture']:.1f}"),
         ("its curvature, drawn (s, by the clock)", f"{seen['curvature']:.1f}"),
+        (f"programs that wanted the {os.cpu_count()} processors before that", f"{load:.1f}"),
     ]
 
 
