@@ -111,3 +111,60 @@ fn with_flat_atom(row: &[f32; SIGNATURE], length: f64) -> Vec<f32> {
 fn norm(row: &[f32]) -> f64 {
     row.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>().sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ExtractOptions, PointCloud, Radius, extract};
+
+    /// A cylinder of radius 1 beside a plane, with a little noise.
+    fn scene() -> Vec<[f64; 3]> {
+        let noise =
+            |i: u32| 2e-4 * (f64::from(i.wrapping_mul(2_654_435_761) >> 8) / f64::from(1 << 24) - 0.5);
+        let cylinder = (0..900_u32).map(|i| (i, 0.05 * f64::from(i % 30) - 0.75, 0.05 * f64::from(i / 30)));
+        let cylinder = cylinder.map(|(i, s, y)| [(1.0 + noise(i)) * s.sin(), y, (1.0 + noise(i)) * s.cos()]);
+        let plane =
+            (0..900_u32).map(|i| [5.0 + 0.05 * f64::from(i % 30), 0.05 * f64::from(i / 30), noise(i)]);
+        cylinder.chain(plane).collect()
+    }
+
+    #[test]
+    fn similarities_are_those_of_signatures_one_by_one_of_the_more_similar_side() {
+        let (points, frame) = (scene(), Frame::shared());
+        let seen_from = |viewpoint| ExtractOptions { viewpoint, ..Default::default() };
+        for viewpoint in [None, Some([2.0, 0.0, 9.0])] {
+            let cloud = PointCloud::new_f64(&points);
+            let found = extract(&cloud, Radius::new(0.3).unwrap(), &seen_from(viewpoint)).unwrap();
+            let flat = found.flat_atom_length(frame).unwrap();
+            let zeta = found.similarities(465, flat, frame);
+            let signature = |k1: f32, k2: f32| {
+                let mut row = frame
+                    .signature(&crate::Paraboloid::of_principal_curvatures(k1, k2, 0.6))
+                    .unwrap()
+                    .to_vec();
+                row.push(flat as f32);
+                row
+            };
+            let own = signature(found.k1[465], found.k2[465]);
+            for i in (0..points.len()).step_by(37) {
+                let same_side = similarity(&own, &signature(found.k1[i], found.k2[i]));
+                let other_side = similarity(&own, &signature(-found.k2[i], -found.k1[i]));
+                let expected = if viewpoint.is_none() { same_side.max(other_side) } else { same_side };
+                assert!((f64::from(zeta[i]) - expected).abs() < 1e-3, "{i}: {} {expected}", zeta[i]);
+            }
+            assert!(zeta[435] > 0.99 && zeta[900 + 465] < 0.9);
+        }
+    }
+
+    #[test]
+    fn without_a_fit_there_is_neither_a_flat_atom_nor_a_similarity() {
+        let found = extract(
+            &PointCloud::new(&[[0.0_f32; 3]; 3]),
+            Radius::new(1.0).unwrap(),
+            &ExtractOptions::default(),
+        )
+        .unwrap();
+        assert_eq!(found.flat_atom_length(Frame::shared()), None);
+        assert!(found.similarities(0, 0.0, Frame::shared()).iter().all(|zeta| zeta.is_nan()));
+    }
+}
