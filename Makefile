@@ -11,7 +11,10 @@ PREFIX ?= /usr/local
 # What the compiled module is made from; a change of any rebuilds it.
 SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -name '*.bin' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help demo test test-all lint format bench bench-reading bench-error bench-segmentation bench-intervals bench-registration bench-finding bench-odometry fuzz docs tour wheel check-wheel header install-c clean build bench-scale
+# The page's tools, from npm; nothing where node is missing.
+NODE := $(shell command -v node 2>/dev/null)
+
+.PHONY: page test-web bench-page help demo test test-all lint format bench bench-reading bench-error bench-segmentation bench-intervals bench-registration bench-finding bench-odometry fuzz docs tour wheel check-wheel header install-c clean build bench-scale
 .DEFAULT_GOAL := help
 
 help: ## Say what there is to make
@@ -37,11 +40,38 @@ lint: build ## Formatters, linters and type checkers
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest surfsig._surfsig
+ifdef NODE
+	$(MAKE) web/node_modules/.built
+	cd web && npm run --silent check
+endif
+
+page: web/node_modules/.built ## Build the page: the core in WebAssembly, and the viewer of all reports
+	cd web && node build_engine.mjs && node build.mjs
+
+test-web: build ## Test the page in Chromium; skipped, with the reason, where Chromium or node is missing
+ifdef NODE
+	$(MAKE) web/node_modules/.built
+	cd web && PYTHON=$(CURDIR)/$(BIN)/python node --test tests/*.test.mjs
+else
+	@echo "skipped: node is missing (https://nodejs.org), which drives the browser"
+endif
+
+bench-page: build web/node_modules/.built ## Time the page in Chromium beside one native thread, and write that part of BENCHMARKS.md
+	$(BIN)/python benchmarks/page.py --write
+
+web/node_modules/.built: web/package-lock.json
+	@command -v npm >/dev/null || { echo "npm is missing: install Node.js 20 or later from https://nodejs.org" >&2; exit 1; }
+	cd web && npm ci --no-audit --no-fund --loglevel=error
+	@touch $@
 
 format: $(VENV)/.tools ## Format all code
 	cargo fmt --all
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+ifdef NODE
+	$(MAKE) web/node_modules/.built
+	cd web && npx prettier --log-level warn --write .
+endif
 
 bench: build ## Time surfsig and its peers in one run, and write BENCHMARKS.md
 	$(BIN)/python benchmarks/run.py --write
@@ -97,7 +127,7 @@ install-c: ## Install the C and C++ interface: make install-c PREFIX=/usr/local
 	cmake --install build/c --prefix $(PREFIX)
 
 clean: ## Remove everything that was built
-	rm -rf $(VENV) target build dist $(OUT)
+	rm -rf $(VENV) target build dist web/node_modules web/dist $(OUT)
 
 build: $(VENV)/.built
 

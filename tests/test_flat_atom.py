@@ -5,7 +5,7 @@ import pytest
 from surface_points import Shape, cylinder, paraboloid, plane
 
 from surfsig import Extraction, Frame, InvalidInputError, extract, flat_atom_length, similarity_matrix
-from surfsig.defaults import FLAT_ATOM_NOISES
+from surfsig._surfsig import FLAT_ATOM_NOISES
 
 RADIUS = 0.02
 

@@ -24,7 +24,9 @@ PYTHON_FLOORS = (
     ("places", "visibility", "simulate"),
     ("files",),
     ("convert",),
-    ("page", "clean", "extraction"),
+    ("page", "clean"),
+    ("extraction_report", "browser"),
+    ("extraction",),
     ("curvature", "field"),
     ("one_sided_normals", "alignment"),
     ("shapes",),
@@ -43,7 +45,7 @@ PYTHON_EXCEPTIONS = {
 }
 
 RUST_FLOORS = (
-    ("error",),
+    ("error", "multiply_add"),
     (
         "statistics",
         "geometry",

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-for needed in ("matplotlib", "plotly", "xlsxwriter", "trimesh"):
+for needed in ("matplotlib", "xlsxwriter", "trimesh"):
     pytest.importorskip(needed)
 
 ROOT = Path(__file__).parents[1]

@@ -23,6 +23,7 @@ from surfsig._surfsig import (
     __version__,
 )
 from surfsig.alignment.free_directions import FreeDirection
+from surfsig.browser import show
 from surfsig.clean import crop, downsample, remove_outliers
 from surfsig.coordinate_system import CoordinateSystem, GeoKeys
 from surfsig.curvature import extract, extract_radii
@@ -175,6 +176,7 @@ __all__ = [
     "register_multiway",
     "remove_missing_returns",
     "remove_outliers",
+    "show",
     "similarity",
     "similarity_class",
     "similarity_matrix",

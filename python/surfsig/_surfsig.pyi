@@ -10,6 +10,7 @@ __all__ = [
     "COARSEST_STEP",
     "FEWEST_AUTO_POINTS",
     "FEWEST_SURFACE_POINTS",
+    "FLAT_ATOM_NOISES",
     "GOOD",
     "INSTRUCTION_SET",
     "KIND_PARAMETERS",
@@ -69,6 +70,7 @@ INSTRUCTION_SET: str
 COARSEST_STEP: float
 RESOLUTION_SAMPLES: int
 OPTIMAL: float
+FLAT_ATOM_NOISES: float
 GOOD: float
 
 def coordinate_resolution(

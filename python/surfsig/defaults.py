@@ -1,6 +1,5 @@
 """The one home of each default."""
 
-import math
 from typing import Literal
 
 Axes = Literal["surface", "sensor"]
@@ -26,14 +25,6 @@ OUTLIER_NEIGHBORS = 20
 
 OUTLIER_STD_RATIO = 2.0
 """Standard deviations above the mean from which on it calls a point an outlier; Open3D's examples use it."""
-
-FLAT_ATOM_NOISES = 2.576 * math.sqrt(2.0) / math.acos(0.9)
-"""Length of the flat atom, in lengths of a signature of pure noise: 8.1.
-
-The signatures of two planes, of noise n and flat atom L, make the angle atan(h1 / L) - atan(h2 / L) with
-normal h1, h2 of standard deviation n; with this length it is within acos(0.9), zeta 0.9 or more, in 99 of 100
-pairs.
-"""
 
 PAPER_SEEDS = 5
 """Draws of noise and poses in the paper's reproduction: an odd number, so that one is in the middle."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
@@ -14,7 +15,9 @@ from surfsig._surfsig import Frame
 from surfsig.arguments import progress_callback
 from surfsig.defaults import SIGNATURE_BLOCK, Axes
 from surfsig.errors import InvalidInputError
+from surfsig.extraction_report import report_html
 from surfsig.flat_atom import flat_atom_length
+from surfsig.page import NOTEBOOK_POINTS, notebook_html, write_page
 from surfsig.places import place_numbers
 from surfsig.point_cloud import PointCloud
 from surfsig.progress import ProgressCallback
@@ -222,6 +225,40 @@ class Extraction:
         fixed = {"radius": repr(self.radius)} if isinstance(self.radius, float) else {}
         notes = {**fixed, "axes": str(self.axes)}
         return table(PointCloud(self.points), self.columns(), notes)
+
+    def to_html(self, *, title: str = "Curvature") -> str:
+        """Make a page that needs no network: the places in a view that turns, coloured by curvature.
+
+        Parameters
+        ----------
+        title
+            The page's.
+
+        Returns
+        -------
+        The document, which needs no network.
+        """
+        return report_html(self, title)
+
+    def write_report(
+        self, path: str | Path, *, title: str = "Curvature", columns: Mapping[str, ArrayLike] | None = None
+    ) -> None:
+        """Write the page of `to_html`. Of more than a million places a million are drawn.
+
+        Parameters
+        ----------
+        path
+            Where to write.
+        title
+            The page's.
+        columns
+            Further numbers of each place, (m,), by name, such as zeta.
+        """
+        write_page(path, report_html(self, title, columns))
+
+    def _repr_html_(self) -> str:
+        """Show the page in a notebook, with at most 100,000 places."""
+        return notebook_html(report_html(self, "Curvature", most_points=NOTEBOOK_POINTS), "Curvature")
 
     def status_counts(self) -> dict[str, int]:
         """Count the places of each status.

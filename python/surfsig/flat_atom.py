@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfsig._surfsig import Frame
-from surfsig.defaults import FLAT_ATOM_NOISES
+from surfsig._surfsig import FLAT_ATOM_NOISES, Frame
 from surfsig.errors import InvalidInputError
 
 if TYPE_CHECKING:

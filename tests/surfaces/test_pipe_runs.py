@@ -160,6 +160,5 @@ def test_the_shell_and_the_report_tell_runs(shell: Shell, found: Surfaces, tmp_p
     assert run["joints"][0]["bend_radius"] == pytest.approx(expected.joints[0].bend_radius, rel=1e-4)
     assert "pipe 0-1-2  0.0" in finished.out.splitlines()[-1]
     assert "long, 2 elbows" in finished.out.splitlines()[-1]
-    pytest.importorskip("plotly")
     found.write_report(tmp_path / "report.html")
     assert "long, 2 elbows" in (tmp_path / "report.html").read_text(encoding="utf-8")

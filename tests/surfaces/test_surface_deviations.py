@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import surface_scenes
-from test_page import figure
+from page_data import report_of
 
 import surfsig
 from surfsig import PointCloud, Surfaces
@@ -39,16 +39,12 @@ def test_points_without_a_surface_have_no_deviation() -> None:
 
 
 def test_the_page_colours_points_by_their_deviation(found: Surfaces, tmp_path: Path) -> None:
-    pytest.importorskip("plotly")
     found.write_report(tmp_path / "page.html")
-    traces, layout = figure(tmp_path / "page.html")
-    shown = [button["args"][0]["visible"] for button in layout["updatemenus"][0]["buttons"]]
-    assert [button["label"] for button in layout["updatemenus"][0]["buttons"]] == ["deviations", "surfaces"]
-    assert shown == [[True, False, False, False, True], [False, True, True, True, True]]
-    assert [trace["visible"] for trace in traces] == shown[1]
-    marker = traces[0]["marker"]
-    assert marker["cmax"] == -marker["cmin"] == pytest.approx(0.00196, rel=0.05)
-    assert marker["colorscale"]
+    (layer,) = report_of(tmp_path / "page.html")["layers"]
+    shown, deviations = layer["columns"]["deviation"], found.deviations()
+    assert np.isnan(shown).sum() == np.isnan(deviations).sum()
+    assert np.nanstd(shown) == pytest.approx(np.nanstd(deviations), rel=1e-3)
+    np.testing.assert_array_equal(np.isnan(shown), layer["labels"] < 0)
 
 
 def test_a_scale_is_symmetric_and_spans_nearly_all_values() -> None:

@@ -730,6 +730,12 @@ surfsig_code surfsig_cloud_new_f64(const double *points,
 size_t surfsig_cloud_size(const surfsig_cloud *cloud);
 
 /**
+ * Median distance of a finite point to its nearest other one; of many points, by a fixed choice of them. 0 for null,
+ * and where no point has another. A radius of 5 to 10 times that is a start.
+ */
+double surfsig_cloud_spacing(const surfsig_cloud *cloud);
+
+/**
  * Frees a cloud, not the points; does nothing with null.
  */
 void surfsig_cloud_free(surfsig_cloud *cloud);
@@ -1466,6 +1472,27 @@ surfsig_code surfsig_signatures(const surfsig_extraction *extraction,
                                 size_t count,
                                 float *signatures,
                                 surfsig_status *statuses);
+
+/**
+ * Length of a flat atom for surfsig_similarities(): one more coordinate, the same for all signatures, that tells "flat
+ * within its error" from "slightly curved". It follows the median standard error of the mean curvature. 0 where no
+ * query has one, where the noise is beyond the vocabulary, and for null.
+ */
+double surfsig_flat_atom_length(const surfsig_extraction *extraction);
+
+/**
+ * Compares all queries with one of them: where else its surface is. In the surface's axes.
+ *
+ * @param extraction Where the queries' surfaces are.
+ * @param query Number of a query, from 0.
+ * @param flat_atom Length of the flat atom, finite, as surfsig_flat_atom_length() gives it; 0 for none.
+ * @param zeta Where zeta of eq. (12) is put, (size) floats: of the more similar side where no viewpoint is known, NaN
+ * where there is no signature.
+ */
+surfsig_code surfsig_similarities(const surfsig_extraction *extraction,
+                                  uint32_t query,
+                                  double flat_atom,
+                                  float *zeta);
 
 /**
  * zeta of eq. (12): how alike the surfaces of two signatures are, from 0 to 1; 0.9 and above is optimal, 0.5

@@ -109,6 +109,20 @@ pub extern "C" fn surfsig_cloud_size(cloud: Option<&surfsig_cloud>) -> usize {
     cloud.map_or(0, |cloud| cloud.view().len())
 }
 
+/// Median distance of a finite point to its nearest other one; of many points, by a fixed choice of them. 0 for null,
+/// and where no point has another. A radius of 5 to 10 times that is a start.
+#[unsafe(no_mangle)]
+pub extern "C" fn surfsig_cloud_spacing(cloud: Option<&surfsig_cloud>) -> f64 {
+    let mut spacing = 0.0;
+    guarded(|| {
+        let positions = cloud.map(surfsig_cloud::positions).unwrap_or_default();
+        let finite: Vec<_> = positions.iter().copied().filter(|p| p.iter().all(|c| c.is_finite())).collect();
+        spacing = surfsig::with_threads(None, || surfsig::point_spacing(&finite))?;
+        Ok(())
+    });
+    spacing
+}
+
 /// Frees a cloud, not the points; does nothing with null.
 #[unsafe(no_mangle)]
 pub extern "C" fn surfsig_cloud_free(cloud: Option<Box<surfsig_cloud>>) {

@@ -15,6 +15,8 @@ mod extraction;
 mod find_options;
 mod finding;
 mod kind;
+#[cfg(target_family = "wasm")]
+mod memory;
 mod moments;
 mod odometry;
 mod options;

@@ -2,12 +2,16 @@
 
 use crate::code::Failure;
 use std::ffi::{c_int, c_void};
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::thread::{Builder, scope};
-use std::time::Duration;
+#[cfg(not(target_family = "wasm"))]
+use std::{
+    sync::mpsc::{RecvTimeoutError, channel},
+    thread::{Builder, scope},
+    time::Duration,
+};
 use surfsig::Monitor;
 
 /// How often the caller is told the progress: often enough for a display, seldom enough to cost nothing.
+#[cfg(not(target_family = "wasm"))]
 const WATCH_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Told how far work is, some twenty times a second, by the thread that called surfsig; the work itself is done by
@@ -19,6 +23,9 @@ const WATCH_INTERVAL: Duration = Duration::from_millis(50);
 /// @return 0 to go on; anything else stops the work, whose function then returns SURFSIG_CODE_CANCELLED.
 pub type surfsig_progress =
     Option<unsafe extern "C" fn(data: *mut c_void, done: usize, total: usize) -> c_int>;
+
+/// One that there is.
+type Function = unsafe extern "C" fn(data: *mut c_void, done: usize, total: usize) -> c_int;
 
 /// A progress function with its data.
 #[derive(Clone, Copy)]
@@ -46,8 +53,47 @@ impl Progress {
         total: usize,
         work: impl FnOnce(&Monitor) -> Result<T, surfsig::Error> + Send,
     ) -> Result<T, Failure> {
+        let Some(function) = self.function else { return Ok(work(&Monitor::default())?) };
+        #[cfg(target_family = "wasm")]
+        return self.watched_in_this_thread(function, total, work);
+        #[cfg(not(target_family = "wasm"))]
+        self.watched_from_outside(function, total, work)
+    }
+
+    /// Does the work where it was called, and reports between its parts.
+    #[cfg(target_family = "wasm")]
+    fn watched_in_this_thread<T>(
+        self,
+        function: Function,
+        total: usize,
+        work: impl FnOnce(&Monitor) -> Result<T, surfsig::Error>,
+    ) -> Result<T, Failure> {
+        /// The caller's data, which WebAssembly's only thread alone uses.
+        struct Data(*mut c_void);
+        // SAFETY: there is one thread.
+        unsafe impl Send for Data {}
+        // SAFETY: there is one thread.
+        unsafe impl Sync for Data {}
+        impl Data {
+            fn pointer(&self) -> *mut c_void {
+                self.0
+            }
+        }
+        let data = Data(self.data);
+        // SAFETY: by the condition of `new`; it is the caller's thread that calls.
+        let report = move |done| unsafe { function(data.pointer(), done, total) } == 0;
+        Ok(work(&Monitor::watched_by(report))?)
+    }
+
+    /// Does the work on a thread of its own, and reports from this one.
+    #[cfg(not(target_family = "wasm"))]
+    fn watched_from_outside<T: Send>(
+        self,
+        function: Function,
+        total: usize,
+        work: impl FnOnce(&Monitor) -> Result<T, surfsig::Error> + Send,
+    ) -> Result<T, Failure> {
         let monitor = Monitor::default();
-        let Some(function) = self.function else { return Ok(work(&monitor)?) };
         // SAFETY: by the condition of `new`; it is the caller's thread that calls.
         let report = || unsafe { function(self.data, monitor.done(), total) };
         scope(|scope| {

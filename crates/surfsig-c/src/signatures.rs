@@ -86,6 +86,50 @@ fn fill(found: &Extraction, queries: &[usize], rows: &mut [[f32; SIGNATURE]], st
     }
 }
 
+/// Length of a flat atom for surfsig_similarities(): one more coordinate, the same for all signatures, that tells "flat
+/// within its error" from "slightly curved". It follows the median standard error of the mean curvature. 0 where no
+/// query has one, where the noise is beyond the vocabulary, and for null.
+#[unsafe(no_mangle)]
+pub extern "C" fn surfsig_flat_atom_length(extraction: Option<&surfsig_extraction>) -> f64 {
+    let mut length = 0.0;
+    guarded(|| {
+        let known = extraction.and_then(|extraction| extraction.found.flat_atom_length(Frame::shared()));
+        length = known.unwrap_or_default();
+        Ok(())
+    });
+    length
+}
+
+/// Compares all queries with one of them: where else its surface is. In the surface's axes.
+///
+/// @param extraction Where the queries' surfaces are.
+/// @param query Number of a query, from 0.
+/// @param flat_atom Length of the flat atom, finite, as surfsig_flat_atom_length() gives it; 0 for none.
+/// @param zeta Where zeta of eq. (12) is put, (size) floats: of the more similar side where no viewpoint is known, NaN
+/// where there is no signature.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn surfsig_similarities(
+    extraction: Option<&surfsig_extraction>,
+    query: u32,
+    flat_atom: f64,
+    zeta: *mut f32,
+) -> surfsig_code {
+    guarded(|| {
+        let surfsig_extraction { found, threads, .. } = present(extraction, "extraction")?;
+        within(Some(query as usize), found)?;
+        if !(flat_atom >= 0.0 && flat_atom.is_finite()) {
+            return Err(Failure::invalid_input(format!("flat_atom must be 0 or above, not {flat_atom}")));
+        }
+        // SAFETY: the caller gives room for a number of each query.
+        let zeta = unsafe { room(zeta, found.len(), "zeta") }?;
+        let frame = Frame::shared();
+        zeta.copy_from_slice(&with_threads(*threads, || {
+            found.similarities(query as usize, flat_atom, frame)
+        })?);
+        Ok(())
+    })
+}
+
 /// zeta of eq. (12): how alike the surfaces of two signatures are, from 0 to 1; 0.9 and above is optimal, 0.5
 /// and above good. NaN where a signature is missing, zero, or null.
 ///

@@ -102,6 +102,7 @@ mod _surfsig {
         module.add("RESOLUTION_SAMPLES", surfsig::RESOLUTION_SAMPLES)?;
         module.add("COARSEST_STEP", surfsig::COARSEST_STEP)?;
         module.add("INSTRUCTION_SET", surfsig::InstructionSet::detect().name())?;
+        module.add("FLAT_ATOM_NOISES", surfsig::FLAT_ATOM_NOISES)?;
         module.add("OPTIMAL", surfsig::OPTIMAL)?;
         module.add("GOOD", surfsig::GOOD)
     }

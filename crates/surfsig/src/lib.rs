@@ -49,6 +49,7 @@ mod lattice;
 mod members;
 mod moments;
 mod monitor;
+mod multiply_add;
 mod neighbor_distances;
 mod odometry;
 mod orientation;
@@ -80,8 +81,8 @@ pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
 pub use depth_image::{DepthImage, Judgement, SurfacePlace};
 pub use error::Error;
 pub use extract::{
-    Column, ExtractOptions, Extraction, FEWEST_AUTO_POINTS, NearestDistances, Neighborhood, PartSize,
-    Queries, WholeCloud, different_places, distance_to_nearest, extract, extract_auto_radius,
+    Column, ExtractOptions, Extraction, FEWEST_AUTO_POINTS, FLAT_ATOM_NOISES, NearestDistances, Neighborhood,
+    PartSize, Queries, WholeCloud, different_places, distance_to_nearest, extract, extract_auto_radius,
     extract_monitored, extract_part, extract_radii, sampled_numbers, voxel_representatives,
 };
 pub use field::{

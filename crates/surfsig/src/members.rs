@@ -3,6 +3,7 @@
 use crate::ball::{BallVisitor, DirectWalk, finish};
 use crate::block_sums::BlockSums;
 use crate::moments::{Moments, Scalar};
+use crate::multiply_add::MultiplyAdd;
 use crate::simd::InstructionSet;
 use crate::simd::select::{BLOCK, Block};
 
@@ -35,7 +36,7 @@ impl Members {
     /// Keeps the `most` nearest and makes their radius the unit of length; returns it, in the unit before:
     /// the distance to the farthest of them, or `radius_of_fewer` where there are no more than that.
     pub fn keep_nearest(&mut self, most: usize, radius_of_fewer: Option<f64>) -> f64 {
-        let square = |&[x, y, z]: &[f32; 3]| z.mul_add(z, y.mul_add(y, x * x));
+        let square = |&[x, y, z]: &[f32; 3]| z.times_plus(z, y.times_plus(y, x * x));
         let farthest = if self.points.len() > most {
             self.sorted.clear();
             self.sorted.extend(self.points.iter().map(square).zip(0..));

@@ -19,9 +19,35 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 pub struct Monitor {
     done: AtomicUsize,
     cancelled: Arc<AtomicBool>,
+    watcher: Option<Watcher>,
+}
+
+/// Told how many queries are done; says whether the work goes on.
+struct Watcher(Box<dyn Fn(usize) -> bool + Send + Sync>);
+
+impl std::fmt::Debug for Watcher {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str("Watcher")
+    }
 }
 
 impl Monitor {
+    /// A monitor that calls a function with the number of queries that are done, after each part of the work, on the
+    /// thread that has done it. The work stops where the function returns `false`. For callers without a second
+    /// thread, as in WebAssembly; others look at [`Self::done`] from time to time.
+    ///
+    /// ```
+    /// use surfsig::{extract_monitored, Error, ExtractOptions, Monitor, PointCloud, Queries, Radius};
+    /// let monitor = Monitor::watched_by(|_| false);
+    /// let cloud = PointCloud::new(&[[0.0; 3]; 8]);
+    /// let found = extract_monitored(&cloud, Radius::new(1.0)?, &Queries::All, &ExtractOptions::default(), &monitor);
+    /// assert_eq!(found.unwrap_err(), Error::Cancelled);
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn watched_by(watcher: impl Fn(usize) -> bool + Send + Sync + 'static) -> Self {
+        Self { watcher: Some(Watcher(Box::new(watcher))), ..Self::default() }
+    }
+
     /// Queries that are done.
     pub fn done(&self) -> usize {
         self.done.load(Relaxed)
@@ -34,7 +60,7 @@ impl Monitor {
 
     /// One for work that is stopped with this, and counted apart.
     pub(crate) fn apart(&self) -> Self {
-        Self { done: AtomicUsize::new(0), cancelled: Arc::clone(&self.cancelled) }
+        Self { done: AtomicUsize::new(0), cancelled: Arc::clone(&self.cancelled), watcher: None }
     }
 
     /// An error where the caller asked to stop.
@@ -48,6 +74,9 @@ impl Monitor {
     }
 
     pub(crate) fn add(&self, queries: usize) {
-        self.done.fetch_add(queries, Relaxed);
+        let done = self.done.fetch_add(queries, Relaxed) + queries;
+        if self.watcher.as_ref().is_some_and(|watcher| !(watcher.0)(done)) {
+            self.cancel();
+        }
     }
 }

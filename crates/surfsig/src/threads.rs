@@ -7,6 +7,8 @@ use crate::Error;
 /// A pool that outlived its call would be missing in a forked child process, which would then wait for
 /// it for ever; making one takes less than a tenth of a millisecond.
 ///
+/// In WebAssembly, which has no threads, the work is done where it was called.
+///
 /// # Errors
 /// [`Error::Threads`] where the system refuses the threads.
 ///
@@ -15,6 +17,9 @@ use crate::Error;
 /// # Ok::<(), surfsig::Error>(())
 /// ```
 pub fn with_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> Result<T, Error> {
+    if cfg!(target_family = "wasm") {
+        return Ok(work());
+    }
     let count = threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
     let pool = pool.map_err(|e| Error::Threads { threads: count, reason: e.to_string() })?;

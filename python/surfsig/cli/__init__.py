@@ -27,6 +27,7 @@ from surfsig.cli.odometry import odometry_command
 from surfsig.cli.paper import paper_command
 from surfsig.cli.register import register_command
 from surfsig.cli.surfaces import surfaces_command
+from surfsig.cli.view import view_command
 from surfsig.errors import SurfsigError
 
 __all__ = ["command_line", "main", "run"]
@@ -66,6 +67,7 @@ for command in (
     compare_command,
     convert_command,
     paper_command,
+    view_command,
     completion_command,
 ):
     command_line.add_command(command)

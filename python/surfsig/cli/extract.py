@@ -92,6 +92,7 @@ QUANTILES = (0.05, 0.5, 0.95)
 @threads_option
 @json_option
 @click.option("--robust", is_flag=True, help="Leave out points that are far from the fitted surface.")
+@click.option("--report", type=CLOUD, metavar="FILE.html", help="Write a page with the points by curvature.")
 @quiet_option
 def extract_command(
     files: tuple[Path, ...],
@@ -108,6 +109,7 @@ def extract_command(
     threads: int | None,
     as_json: bool,
     robust: bool,
+    report: Path | None,
     quiet: bool,
     **more: Any,
 ) -> None:
@@ -135,6 +137,7 @@ def extract_command(
 
     import surfsig
     from surfsig.files import check_writable, write
+    from surfsig.files.atomic import check_target
     from surfsig.missing_returns import warn_of_missing_returns
 
     if at and voxel is not None:
@@ -142,7 +145,7 @@ def extract_command(
     shown = on_terminal() and not quiet
     tiling, reading = split_options(more)
     if is_tiled(output, tiling):
-        refuse_in_tiles(signatures=signatures, like=like, at=at, voxel=voxel, **reading)
+        refuse_in_tiles(report=report, signatures=signatures, like=like, at=at, voxel=voxel, **reading)
         how_in_tiles = {
             "radius": radius,
             "neighbors": neighbors,
@@ -163,6 +166,8 @@ def extract_command(
     file = files[0] if len(files) == 1 else files
     told = str(files[0]) if len(files) == 1 else f"{files[0]} and {len(files) - 1} more"
     check_writable(output)
+    if report is not None:
+        check_target(report)
     refuse_too_large(file, told)
     how = {"radius": radius, "neighbors": neighbors, "axes": axes, "fit": fit, "robust": robust}
     clock = [time.perf_counter()]
@@ -199,6 +204,9 @@ def extract_command(
             progress=progress,
         )
     clock.append(time.perf_counter())
+    if report is not None:
+        zeta = {"zeta": columns["zeta"]} if "zeta" in columns else None
+        result.write_report(report, title=f"Curvature of {told}", columns=zeta)
     seconds = dict(zip(("read", "extract", "write"), np.diff(clock).tolist(), strict=True))
     summary: dict[str, Any] = {"input": told, "output": str(output), **how}
     summary |= {"signatures": signatures, **_summary(result, status), "seconds": seconds}

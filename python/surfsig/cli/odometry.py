@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     "--distance", type=float, help="To partners in the map, at most.  [default: by how well motion is known]"
 )
 @click.option("--map-range", type=float, help="Of the map about the sensor.  [default: by the scans]")
+@click.option(
+    "--report", type=CLOUD, metavar="FILE.html", help="Write a page with the trajectory and the map."
+)
 @input_options
 @threads_option
 @json_option
@@ -49,6 +52,7 @@ def odometry_command(
     voxel: float | None,
     distance: float | None,
     map_range: float | None,
+    report: Path | None,
     threads: int | None,
     as_json: bool,
     quiet: bool,
@@ -72,7 +76,7 @@ def odometry_command(
     from surfsig.files import trajectory_format
     from surfsig.files.atomic import check_target
 
-    for target in (output, covariances):
+    for target in (output, covariances, report):
         if target is not None:
             check_target(target)
     shown = on_terminal() and not quiet
@@ -96,6 +100,10 @@ def odometry_command(
     surfsig.write_trajectory(output, found.poses, found.timestamps, format=chosen)
     if covariances is not None:
         surfsig.write_covariances(covariances, found.covariances)
+    if report is not None:
+        # Read once more: a sequence may be larger than memory.
+        clouds = (scan.cloud for scan in sequence)
+        found.write_report(report, clouds, title=f"Trajectory of {scans[0].name}")
     if as_json:
         values = {"output": str(output), "format": chosen, "scans": len(found), **counts}
         print_json({**values, "length": found.length, "voxel": found.voxel})

@@ -14,8 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.cloud_transforms import transform_cloud
-from surfsig.colors import GREY, distinct_colors
 from surfsig.digits import position_text, rounded
+from surfsig.page import NOTEBOOK_POINTS, Layer, notebook_html, page_html, write_page
+from surfsig.page.packing import MOST_POINTS
 from surfsig.point_cloud import PointCloud
 
 if TYPE_CHECKING:
@@ -145,7 +146,7 @@ class Instances:
     def write_report(self, path: str | Path, *, title: str = "Instances") -> None:
         """Write one HTML page: the scene before, and after with the models in colours, and a table.
 
-        The page needs no network. Of many points 60,000 are drawn.
+        The page needs no network. Of more than a million points a million are drawn.
 
         Parameters
         ----------
@@ -153,26 +154,42 @@ class Instances:
             Where to write.
         title
             The page's.
-
-        Raises
-        ------
-        InvalidInputError
-            If Plotly is not installed (`pip install surfsig[report]`).
         """
-        from surfsig.page import Group, write_page
+        write_page(path, self.to_html(title=title))
 
+    def to_html(self, *, title: str = "Instances") -> str:
+        """Make the page that `write_report` writes.
+
+        Parameters
+        ----------
+        title
+            The page's.
+
+        Returns
+        -------
+        The document, which needs no network.
+        """
+        return self._page(title, MOST_POINTS)
+
+    def _repr_html_(self) -> str:
+        """Show the page in a notebook, with at most 100,000 points."""
+        return notebook_html(self._page("Instances", NOTEBOOK_POINTS), "Instances")
+
+    def _page(self, title: str, most_points: int) -> str:
         header, rows = self.table()
-        points, labels = self.cloud.points, self.labels
-        groups = [Group("scene", points[labels < 0], GREY)]
-        if len(self):
-            groups.append(Group("what is found", points[labels >= 0], GREY, state="before"))
-        for number, color in enumerate(distinct_colors(len(self)).tolist()):
-            words = [f"{what}: {value}" for what, value in zip(header[2:], rows[number][2:], strict=True)]
-            name = f"{number} {self.instances[number].name}"
-            both = np.concatenate([points[labels == number], self.placed(number).points])
-            groups.append(Group(name, both, color, number, words, state="after"))
+        layers = [Layer("scene", self.cloud.points, labels=self.labels, label_name="Instance")]
+        for number, instance in enumerate(self.instances):
+            points = self.placed(number).points
+            labels = np.full(len(points), number)
+            layers.append(
+                Layer(
+                    f"{number} {instance.name}", points, labels=labels, label_name="Instance", stage="after"
+                )
+            )
         text = f"{self.summary()}. A click on a point or a row shows the instance."
-        write_page(path, title, text, groups, header, rows)
+        return page_html(
+            title, text, layers, header=header, rows=rows, quantity="surface", most_points=most_points
+        )
 
     def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Describe the instances for people.

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from surfsig.odometry.report import report_html
+from surfsig.page import write_page
+from surfsig.point_cloud import PointCloud
 
 Array = NDArray[np.float64]
 
@@ -66,6 +72,38 @@ class Odometry:
         Numbers by the status's name in lower case.
         """
         return {status.name.lower(): int((self.status == status).sum()) for status in ScanStatus}
+
+    def to_html(self, *, title: str = "Odometry") -> str:
+        """Make a page that needs no network: the trajectory, with ellipsoids of its covariances.
+
+        Parameters
+        ----------
+        title
+            The page's.
+
+        Returns
+        -------
+        The document, which needs no network.
+        """
+        return report_html(self, None, title)
+
+    def write_report(
+        self, path: str | Path, scans: Iterable[PointCloud] | None = None, *, title: str = "Odometry"
+    ) -> None:
+        """Write one HTML page: the trajectory with ellipsoids, and what the scans saw.
+
+        The page needs no network. Of more than a million points a million are drawn.
+
+        Parameters
+        ----------
+        path
+            Where to write.
+        scans
+            The scans in their order, each in its own frame; None draws the trajectory alone.
+        title
+            The page's.
+        """
+        write_page(path, report_html(self, scans, title))
 
     @property
     def length(self) -> float:

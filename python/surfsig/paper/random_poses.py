@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from .._surfsig import GOOD, OPTIMAL, Frame
-from ..defaults import FLAT_ATOM_NOISES
+from .._surfsig import FLAT_ATOM_NOISES, GOOD, OPTIMAL, Frame
 from ..flat_atom import mean_curvature_noise
 from ..signature_similarity import similarity_matrix
 from ..simulate import Scanner
@@ -44,7 +43,7 @@ def flat_atom(ball: float, scanner: Scanner | None = None) -> float:
     - The fit's H then has the standard deviation 6.9 s / (r^2 sqrt(N)) (a paraboloid's theory). On a plane
       the signature is H times that of unit H: to first order nothing else is left of noise.
     - The flat atom is so many times as long as that noise that 99 of 100 pairs of planes are at 0.9 or
-      above (`defaults.FLAT_ATOM_NOISES`).
+      above (`FLAT_ATOM_NOISES`).
 
     Parameters
     ----------

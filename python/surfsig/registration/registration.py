@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from surfsig import cloud_transforms, geometry
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.digits import position_text
+from surfsig.page import Layer, page_html, write_page
 from surfsig.point_cloud import PointCloud, coordinate_array
 
 Array = NDArray[np.float64]
@@ -169,7 +170,8 @@ class Registration:
     ) -> None:
         """Write one HTML page: both clouds before and after, in a view that turns, and what was found.
 
-        The page needs no network. Of many points 60,000 are drawn.
+        A slider moves the source. The page needs no network. Of more than a million points a million are
+        drawn.
 
         Parameters
         ----------
@@ -179,23 +181,20 @@ class Registration:
             The clouds that were registered.
         title
             The page's.
-
-        Raises
-        ------
-        InvalidInputError
-            If Plotly is not installed (`pip install surfsig[report]`).
         """
-        from surfsig.page import Group, write_page
-
-        moving, still = "source", "target"
-        groups = [
-            Group(still, target.points, _BLUE),
-            Group(moving, source.points, _ORANGE, state="before"),
-            Group(moving, self.transform_points(source.points), _ORANGE, state="after"),
+        known = bool(np.isfinite(self.T_target_source).all())
+        layers = [
+            Layer("target", target.points, color=_BLUE),
+            Layer(
+                "source",
+                source.points,
+                color=_ORANGE,
+                T_target_source=self.T_target_source if known else None,
+            ),
         ]
         trusted = "trusted" if self.trusted else "not trusted"
-        text = f"The source before and after it was moved into the target: {trusted}."
-        write_page(path, title, text, groups, ("", ""), self.rows())
+        text = f"The source (orange) before and after it was moved into the target (blue): {trusted}."
+        write_page(path, page_html(title, text, layers, header=("", ""), rows=self.rows()))
 
     def values(self) -> dict[str, Any]:
         """Give everything as plain numbers, for JSON; None for what is not known.

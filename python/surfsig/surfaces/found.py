@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 
 from surfsig import _surfsig
 from surfsig.colors import GREY, distinct_colors
+from surfsig.page import NOTEBOOK_POINTS, notebook_html, write_page
 from surfsig.point_cloud import PointCloud
 from surfsig.shapes.surface import Surface
 from surfsig.surfaces.classes import PointClass, classify, deviations_of
 from surfsig.surfaces.export import export
 from surfsig.surfaces.pipe_runs import PipeRun, find_pipe_runs
+from surfsig.surfaces.report import report_html
 from surfsig.surfaces.table import table_columns, write_csv, write_excel
 from surfsig.surfaces.wording import HEADER, table_rows
 
@@ -247,8 +249,9 @@ class Surfaces:
     def write_report(self, path: str | Path, *, title: str = "Surfaces") -> None:
         """Write one HTML page: the points coloured by surface, in a view that turns, and a table with errors.
 
-        A button colours them by their distance from the surface, on a scale that is symmetric about 0 and as
-        wide as 95 % of the distances. The page needs no network. Of many points 60,000 are drawn.
+        Coloured by their distance from the surface, they have a scale that is symmetric about 0 and as wide
+        as 95 % of the distances. The page needs no network. Of more than a million points a million are
+        drawn.
 
         Parameters
         ----------
@@ -256,15 +259,26 @@ class Surfaces:
             Where to write.
         title
             The page's.
-
-        Raises
-        ------
-        InvalidInputError
-            If Plotly is not installed (`pip install surfsig[report]`).
         """
-        from surfsig.surfaces.report import write_report
+        write_page(path, self.to_html(title=title))
 
-        write_report(self, path, title)
+    def to_html(self, *, title: str = "Surfaces") -> str:
+        """Make the page that `write_report` writes.
+
+        Parameters
+        ----------
+        title
+            The page's.
+
+        Returns
+        -------
+        The document, which needs no network.
+        """
+        return report_html(self, title)
+
+    def _repr_html_(self) -> str:
+        """Show the page in a notebook, with at most 100,000 points."""
+        return notebook_html(report_html(self, "Surfaces", NOTEBOOK_POINTS), "Surfaces")
 
     def _why_none(self) -> str:
         finite = int(self.cloud.finite.sum())

@@ -39,6 +39,10 @@ pub fn extractions(called: &mut Called) {
                 why.resize_with(points.len(), || surfsig_status::Ok);
                 let (rows, why) = (rows.as_mut_ptr(), why.as_mut_ptr());
                 call!(called, surfsig_signatures(extraction, null(), points.len(), rows, why) gives OK);
+                let flat = call!(called, surfsig_flat_atom_length(extraction));
+                assert!(flat >= 0.0 && flat.is_finite());
+                let code = if points.is_empty() { INVALID } else { OK };
+                assert_eq!(call!(called, surfsig_similarities(extraction, 0, flat, rows)), code);
             }
             call!(called, surfsig_extraction_free(owned(std::mem::replace(&mut made, null_mut()))));
         };
@@ -76,6 +80,15 @@ pub fn extractions(called: &mut Called) {
     surfsig_options_free(Some(options));
 
     let extraction = unsafe { made.as_ref() };
+    let mut alike = [7.0_f32; 400];
+    call!(called, surfsig_similarities(extraction, 400, 0.0, alike.as_mut_ptr()) gives INVALID);
+    call!(called, surfsig_similarities(extraction, 0, -1.0, alike.as_mut_ptr()) gives INVALID);
+    call!(called, surfsig_similarities(extraction, 0, f64::NAN, alike.as_mut_ptr()) gives INVALID);
+    call!(called, surfsig_similarities(extraction, 0, 0.0, null_mut()) gives INVALID);
+    call!(called, surfsig_similarities(None, 0, 0.0, alike.as_mut_ptr()) gives INVALID);
+    assert_eq!(call!(called, surfsig_flat_atom_length(None)), 0.0);
+    assert_eq!(call!(called, surfsig_cloud_spacing(None)), 0.0);
+    assert!(call!(called, surfsig_cloud_spacing(cloud.get())) > 0.0);
     let mut row = [0.0_f32; SURFSIG_SIGNATURE];
     let out = row.as_mut_ptr();
     call!(called, surfsig_signatures(None, null(), 1, out, null_mut()) gives INVALID);

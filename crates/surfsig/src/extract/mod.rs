@@ -1,5 +1,6 @@
 //! From points to curvature: the only loop over points.
 
+mod alike;
 mod auto_radius;
 mod columns;
 mod declaration;
@@ -14,6 +15,7 @@ mod shares;
 mod whole_cloud;
 mod worker;
 
+pub use alike::FLAT_ATOM_NOISES;
 pub use auto_radius::{FEWEST_AUTO_POINTS, extract_auto_radius};
 pub use extraction::{Column, Extraction};
 pub use neighborhood::{

@@ -6,6 +6,7 @@
 use super::symmetry::{EVEN, Part};
 use super::{Frame, SIGNATURE, VOCABULARY_END};
 use crate::curvature::{GRID, Paraboloid, grid_coordinate};
+use crate::multiply_add::MultiplyAdd;
 use crate::simd::{InstructionSet, for_each_instruction_set};
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -112,7 +113,7 @@ fn combine_in(window: &[[f32; FREE]], weights: &[[f32; 4]; 4]) -> [f32; FREE] {
         for (j, &weight) in weights.iter().enumerate() {
             let node = &window[i * NODES + j];
             for l in 0..FREE {
-                sum[l] = node[l].mul_add(weight, sum[l]);
+                sum[l] = node[l].times_plus(weight, sum[l]);
             }
         }
     }

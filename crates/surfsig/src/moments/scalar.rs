@@ -1,5 +1,6 @@
 //! The numbers that sums are kept in.
 
+use crate::multiply_add::MultiplyAdd;
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Mul, Sub};
 
@@ -30,7 +31,7 @@ pub trait Scalar:
     fn from_f32(value: f32) -> Self;
     /// Exact value.
     fn to_f64(self) -> f64;
-    /// `self * factor + term`, rounded once.
+    /// `self * factor + term`, rounded once; in WebAssembly, which has no such instruction, twice.
     fn mul_add(self, factor: Self, term: Self) -> Self;
 }
 
@@ -51,7 +52,7 @@ macro_rules! scalar {
             }
             #[inline(always)]
             fn mul_add(self, factor: Self, term: Self) -> Self {
-                <$float>::mul_add(self, factor, term)
+                self.times_plus(factor, term)
             }
         }
     };

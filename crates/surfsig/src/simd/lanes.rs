@@ -4,6 +4,7 @@
 //! AVX-512, each becomes one or two instructions. No lane ever looks at another, so a point's result
 //! does not depend on its neighbours in the batch.
 
+use crate::multiply_add::MultiplyAdd;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 /// `[f(0), f(1), ...]` by a plain loop: a closure handed to a library function would be compiled on
@@ -40,10 +41,10 @@ impl Lanes {
         Self([value; LANES])
     }
 
-    /// `self * factor + term`, rounded once.
+    /// `self * factor + term`, rounded once where the hardware can.
     #[inline(always)]
     pub fn mul_add(self, factor: Self, term: Self) -> Self {
-        Self(each_lane!(l => self.0[l].mul_add(factor.0[l], term.0[l])))
+        Self(each_lane!(l => self.0[l].times_plus(factor.0[l], term.0[l])))
     }
 
     #[inline(always)]

@@ -8,6 +8,8 @@ pub(crate) mod lanes;
 pub(crate) mod partition;
 pub(crate) mod products;
 pub(crate) mod select;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod select_wasm;
 pub(crate) mod split;
 
 pub use instruction_set::InstructionSet;

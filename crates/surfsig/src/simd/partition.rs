@@ -3,6 +3,7 @@
 use super::InstructionSet;
 use super::instruction_set::Kind;
 use super::select::{BLOCK, Block, PIECE};
+use crate::multiply_add::MultiplyAdd;
 
 /// Appends the first `len` members of a block, at most [`PIECE`], to `inner` where the square of their distance
 /// from the centre is at most `limit`, and to `outer` where it is more.
@@ -30,7 +31,7 @@ pub(crate) fn partition(
 fn partition_baseline(members: &Block, len: usize, limit: f32, inner: &mut Block, outer: &mut Block) {
     for i in 0..len {
         let [x, y, z] = [members.x[i], members.y[i], members.z[i]];
-        let is_inner = z.mul_add(z, y.mul_add(y, x * x)) <= limit;
+        let is_inner = z.times_plus(z, y.times_plus(y, x * x)) <= limit;
         for (block, belongs) in [(&mut *inner, is_inner), (&mut *outer, !is_inner)] {
             (block.x[block.len], block.y[block.len], block.z[block.len]) = (x, y, z);
             block.len += usize::from(belongs);
@@ -127,7 +128,7 @@ mod tests {
         let limit = 0.4;
         let inside = |i: usize| {
             let [x, y, z] = [members.x[i], members.y[i], members.z[i]];
-            z.mul_add(z, y.mul_add(y, x * x)) <= limit
+            z.times_plus(z, y.times_plus(y, x * x)) <= limit
         };
         for set in InstructionSet::available() {
             for len in [0, 1, 7, 8, 9, 15, 16, 17, 100, PIECE] {

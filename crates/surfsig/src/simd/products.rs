@@ -1,6 +1,7 @@
 //! Scalar products of many vectors with many others: the one kernel for tiles of both.
 
 use super::{InstructionSet, for_each_instruction_set};
+use crate::multiply_add::MultiplyAdd;
 
 /// Vectors of one side of a tile, which are read one after the other.
 pub(crate) const ROWS: usize = 8;
@@ -57,7 +58,7 @@ fn tile_in<const TOGETHER: usize>(rows: &[&[f32]; ROWS], panel: &[[f32; COLUMNS]
             for r in 0..TOGETHER {
                 let value = some[r][n];
                 for c in 0..COLUMNS {
-                    sums[r][c] = value.mul_add(panel[n][c], sums[r][c]);
+                    sums[r][c] = value.times_plus(panel[n][c], sums[r][c]);
                 }
             }
         }

@@ -7,6 +7,7 @@
 use super::InstructionSet;
 use super::instruction_set::Kind;
 use crate::lattice::Lattice;
+use crate::multiply_add::MultiplyAdd;
 
 /// The ball is d^2 <= r^2 (1 + 1e-5), in units of r: float32 offsets cannot decide a tie, and on a
 /// regular grid many points lie exactly on the sphere.
@@ -115,9 +116,9 @@ pub(crate) struct Place {
 
 /// How a row's offsets become offsets from the ball's centre in units of its radius: `scale * offset + shift`.
 #[derive(Clone, Copy)]
-struct Placement {
-    scale: f32,
-    shift: [f32; 3],
+pub(super) struct Placement {
+    pub(super) scale: f32,
+    pub(super) shift: [f32; 3],
 }
 
 /// Appends members of the ball to `block`, from `place` on, until the block holds [`BLOCK`] of them or
@@ -132,7 +133,14 @@ pub(crate) fn gather<const RANKS: bool>(
     place: &mut Place,
 ) -> bool {
     match set.0 {
+        #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
         Kind::Baseline => gather_by(rows, windows, ball, block, place, select_baseline::<RANKS>),
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+        Kind::Baseline => gather_by(rows, windows, ball, block, place, |rows, ranks, placement, block| {
+            // SAFETY: `gather_by` checks that the rows are readable for 16 slots beyond the ranks, of which it hands on
+            // at most `PIECE`, and only while the block holds less than `BLOCK`.
+            unsafe { super::select_wasm::select_simd128::<RANKS>(rows, ranks, placement, block) }
+        }),
         // SAFETY: the value of `set` proves AVX2, FMA and POPCNT.
         #[cfg(target_arch = "x86_64")]
         Kind::Avx2 => unsafe { x86::gather_avx2::<RANKS>(rows, windows, ball, block, place) },
@@ -181,6 +189,7 @@ fn gather_by(
 
 /// Eight distances at a time, which the compiler vectorises; then a store of every point, of which
 /// the next overwrites those that are outside.
+#[cfg_attr(all(target_arch = "wasm32", target_feature = "simd128"), allow(dead_code))]
 #[inline(always)]
 fn select_baseline<const RANKS: bool>(
     rows: Rows<'_>,
@@ -191,12 +200,12 @@ fn select_baseline<const RANKS: bool>(
     const WIDTH: usize = 8;
     let Placement { scale, shift } = placement;
     for start in ranks.clone().step_by(WIDTH) {
-        let lane = |row: &[f32], l: usize, axis: usize| row[start + l].mul_add(scale, shift[axis]);
+        let lane = |row: &[f32], l: usize, axis: usize| row[start + l].times_plus(scale, shift[axis]);
         let x: [f32; WIDTH] = std::array::from_fn(|l| lane(rows.x, l, 0));
         let y: [f32; WIDTH] = std::array::from_fn(|l| lane(rows.y, l, 1));
         let z: [f32; WIDTH] = std::array::from_fn(|l| lane(rows.z, l, 2));
         let inside: [bool; WIDTH] = std::array::from_fn(|l| {
-            let square = z[l].mul_add(z[l], y[l].mul_add(y[l], x[l] * x[l]));
+            let square = z[l].times_plus(z[l], y[l].times_plus(y[l], x[l] * x[l]));
             square <= BALL_LIMIT && start + l < ranks.end
         });
         for l in 0..WIDTH {
@@ -387,9 +396,9 @@ mod tests {
                 let ranks: Vec<usize> = block.rank[..block.len].iter().map(|&k| k as usize).collect();
                 assert_eq!(ranks, expected, "{} {len}", set.name());
                 for (slot, &i) in expected.iter().enumerate() {
-                    assert_eq!(block.x[slot], x[i].mul_add(0.7, 0.1));
-                    assert_eq!(block.y[slot], y[i].mul_add(0.7, -0.2));
-                    assert_eq!(block.z[slot], z[i].mul_add(0.7, 0.05));
+                    assert_eq!(block.x[slot], x[i].times_plus(0.7, 0.1));
+                    assert_eq!(block.y[slot], y[i].times_plus(0.7, -0.2));
+                    assert_eq!(block.z[slot], z[i].times_plus(0.7, 0.05));
                 }
             }
         }

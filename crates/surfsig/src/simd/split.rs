@@ -3,6 +3,7 @@
 use super::InstructionSet;
 use super::instruction_set::Kind;
 use super::select::{BLOCK, Block, PADDING, PIECE, Rows};
+use crate::multiply_add::MultiplyAdd;
 use std::ops::Range;
 
 /// Farther than this from all points of the box, the square in units of the radius: in no ball. The exact
@@ -79,11 +80,11 @@ fn split_baseline(rows: Rows<'_>, ranks: Range<usize>, queries: QueryBox, inside
         let offset = [rows.x[rank], rows.y[rank], rows.z[rank]];
         let (mut place, mut nearest, mut farthest) = ([0.0; 3], 0.0_f32, 0.0_f32);
         for axis in 0..3 {
-            place[axis] = offset[axis].mul_add(scale, shift[axis]);
+            place[axis] = offset[axis].times_plus(scale, shift[axis]);
             let far = place[axis].abs() + half[axis];
             let near = (place[axis].abs() - half[axis]).max(0.0);
-            nearest = near.mul_add(near, nearest);
-            farthest = far.mul_add(far, farthest);
+            nearest = near.times_plus(near, nearest);
+            farthest = far.times_plus(far, farthest);
         }
         [inside.x[inside.len], inside.y[inside.len], inside.z[inside.len]] = place;
         [rim.x[rim.len], rim.y[rim.len], rim.z[rim.len]] = offset;
@@ -235,9 +236,9 @@ mod tests {
                     (0..len).filter(|&i| square(i, 1.0) > 1.0 && square(i, -1.0) <= 1.0).collect();
                 assert_eq!((inside.len, rim.len), (all.len(), some.len()), "{} {len}", set.name());
                 for (slot, i) in all.into_iter().enumerate() {
-                    assert_eq!(inside.x[slot], x[i].mul_add(0.9, 0.1));
-                    assert_eq!(inside.y[slot], y[i].mul_add(0.9, -0.2));
-                    assert_eq!(inside.z[slot], z[i].mul_add(0.9, 0.05));
+                    assert_eq!(inside.x[slot], x[i].times_plus(0.9, 0.1));
+                    assert_eq!(inside.y[slot], y[i].times_plus(0.9, -0.2));
+                    assert_eq!(inside.z[slot], z[i].times_plus(0.9, 0.05));
                 }
                 for (slot, i) in some.into_iter().enumerate() {
                     assert_eq!([rim.x[slot], rim.y[slot], rim.z[slot]], [x[i], y[i], z[i]]);

@@ -1,6 +1,7 @@
 //! Members of a ball pooled into harmonics.
 
 use super::{BINS, HEIGHTS, LANES, Members, ORDERS, Pool, QUANTITIES, RINGS, WAVES};
+use crate::multiply_add::MultiplyAdd;
 use crate::simd::{InstructionSet, for_each_instruction_set};
 
 /// What a member adds to the four bins around it.
@@ -116,13 +117,13 @@ for_each_instruction_set! {
 /// The scalar product of a lane of two vectors.
 #[inline(always)]
 fn dot(a: &[[f32; LANES]; 3], b: &[[f32; LANES]; 3], l: usize) -> f32 {
-    a[2][l].mul_add(b[2][l], a[1][l].mul_add(b[1][l], a[0][l] * b[0][l]))
+    a[2][l].times_plus(b[2][l], a[1][l].times_plus(b[1][l], a[0][l] * b[0][l]))
 }
 
 /// The part of a lane of vectors along another.
 #[inline(always)]
 fn turned(vectors: &[[f32; LANES]; 3], along: &[f32; 3], l: usize) -> f32 {
-    vectors[2][l].mul_add(along[2], vectors[1][l].mul_add(along[1], vectors[0][l] * along[0]))
+    vectors[2][l].times_plus(along[2], vectors[1][l].times_plus(along[1], vectors[0][l] * along[0]))
 }
 
 /// The first of two bins that share a value, and the part of the second.
@@ -145,7 +146,7 @@ fn share_out_in(members: &[Members], [x, y, z]: &[[f32; 3]; 3], shares: &mut [Sh
         for l in 0..LANES {
             let (u, v) = (turned(&members.place, x, l), turned(&members.place, y, l));
             let height = turned(&members.place, z, l);
-            let distance = v.mul_add(v, u * u).sqrt();
+            let distance = v.times_plus(v, u * u).sqrt();
             // On the axis no direction is outwards.
             let inverse = if distance > 1e-6 { 1.0 / distance } else { 0.0 };
             let (cosine, sine) = (u * inverse, v * inverse);
@@ -154,19 +155,19 @@ fn share_out_in(members: &[Members], [x, y, z]: &[[f32; 3]; 3], shares: &mut [Sh
             waves[ORDERS + 1][l] = sine;
             let (a, b) = (turned(&members.normal, x, l), turned(&members.normal, y, l));
             quantities[0][l] = turned(&members.normal, z, l);
-            quantities[1][l] = b.mul_add(sine, a * cosine);
-            quantities[2][l] = b.mul_add(cosine, -a * sine);
+            quantities[1][l] = b.times_plus(sine, a * cosine);
+            quantities[2][l] = b.times_plus(cosine, -a * sine);
             let (a, b) = (turned(&members.direction, x, l), turned(&members.direction, y, l));
-            let (along, across) = (b.mul_add(sine, a * cosine), b.mul_add(cosine, -a * sine));
+            let (along, across) = (b.times_plus(sine, a * cosine), b.times_plus(cosine, -a * sine));
             let difference = members.difference[l];
             quantities[3][l] = members.bend[l];
             quantities[4][l] = difference;
-            quantities[5][l] = difference * across.mul_add(-across, along * along);
+            quantities[5][l] = difference * across.times_plus(-across, along * along);
             quantities[6][l] = difference * (2.0 * along * across);
             let (ring, outer) = shared(distance * RINGS as f32, RINGS);
             let (level, upper) = shared((height + 1.0) * (0.5 * HEIGHTS as f32), HEIGHTS);
             // From 2^23 on, the last bits are the whole number.
-            cells[l] = (ring.mul_add(HEIGHTS as f32, level) + 8_388_608.0).to_bits() & 0xff;
+            cells[l] = (ring.times_plus(HEIGHTS as f32, level) + 8_388_608.0).to_bits() & 0xff;
             weights[0][l] = (1.0 - outer) * (1.0 - upper);
             weights[1][l] = (1.0 - outer) * upper;
             weights[2][l] = outer * (1.0 - upper);
@@ -176,8 +177,8 @@ fn share_out_in(members: &[Members], [x, y, z]: &[[f32; 3]; 3], shares: &mut [Sh
             for l in 0..LANES {
                 let (cosine, sine) = (waves[1][l], waves[ORDERS + 1][l]);
                 let (c, s) = (waves[order - 1][l], waves[ORDERS + order - 1][l]);
-                waves[order][l] = s.mul_add(-sine, c * cosine);
-                waves[ORDERS + order][l] = s.mul_add(cosine, c * sine);
+                waves[order][l] = s.times_plus(-sine, c * cosine);
+                waves[ORDERS + order][l] = s.times_plus(cosine, c * sine);
             }
         }
         hand_out(&waves, &quantities, &weights, &cells, shares);
@@ -232,7 +233,7 @@ fn add_in(shares: &[Share], members: &[u32], corner: usize, bin: &mut [[f32; WAV
 #[inline(always)]
 fn add_waves(sums: &mut [f32; WAVES], factor: f32, waves: &[f32; WAVES]) {
     for w in 0..WAVES {
-        sums[w] = factor.mul_add(waves[w], sums[w]);
+        sums[w] = factor.times_plus(waves[w], sums[w]);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Harmonics seen in a frame.
 
 use super::{BINS, FEATURES, ORDERS, Pool, QUANTITIES, WAVES};
+use crate::multiply_add::MultiplyAdd;
 use crate::simd::for_each_instruction_set;
 
 /// Atoms of one order that are worked with at a time.
@@ -49,8 +50,8 @@ fn project_in<const TOGETHER: usize>(
                     let (c, s) = (waves[order], waves[ORDERS + order]);
                     let [real, imaginary] = &mut sums[t];
                     for l in 0..ATOMS {
-                        real[l] = s.mul_add(-im[l], c.mul_add(re[l], real[l]));
-                        imaginary[l] = s.mul_add(re[l], c.mul_add(im[l], imaginary[l]));
+                        real[l] = s.times_plus(-im[l], c.times_plus(re[l], real[l]));
+                        imaginary[l] = s.times_plus(re[l], c.times_plus(im[l], imaginary[l]));
                     }
                 }
             }
@@ -76,7 +77,7 @@ fn length_in(pool: &Pool) -> f64 {
     for feature in pool.features() {
         for w in 0..WAVES {
             let value = f64::from(feature[w]);
-            sums[w] = value.mul_add(value, sums[w]);
+            sums[w] = value.times_plus(value, sums[w]);
         }
     }
     let mut sum = 0.0;

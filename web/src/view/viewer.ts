@@ -1,0 +1,323 @@
+/** The view: a camera that turns about the points, eye-dome lighting, and as many points as are drawn smoothly. */
+
+import {
+  DepthTexture,
+  type Object3D,
+  OrthographicCamera,
+  PerspectiveCamera,
+  Mesh,
+  NearestFilter,
+  PlaneGeometry,
+  Scene,
+  ShaderMaterial,
+  Sphere,
+  Box3,
+  UnsignedIntType,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+  WebGLRenderTarget,
+  Color,
+} from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import type { Vector } from "../files/cloud.js";
+import { inView, pick, type Picked, projector } from "./pick.js";
+import { PointLayer } from "./points.js";
+import { EYE_DOME_FRAGMENT, SCREEN_VERTEX } from "./shaders.js";
+
+/** Most points that are drawn when the view stands still. */
+const MOST_STILL = 6_000_000;
+/** Points drawn while it moves, at first; then as many as take about a frame. */
+const MOVING_START = 1_000_000;
+const MOVING_LEAST = 60_000;
+/** Milliseconds of a frame above which fewer points are drawn while moving, and below which more. */
+const [SLOW_FRAME, FAST_FRAME] = [40, 18];
+/** Darkness of an edge, per power of two by which its other side is nearer. */
+const EYE_DOME = 18;
+/** Width of the view, in widths of what it shows. */
+const MARGIN = 1.06;
+/** Milliseconds without a motion after which all are drawn. */
+const REST = 180;
+
+/** What a link keeps of the view. */
+export interface ViewState {
+  position: Vector;
+  target: Vector;
+}
+
+export class Viewer {
+  readonly camera = new PerspectiveCamera(45, 1, 0.01, 1000);
+  readonly layers: PointLayer[] = [];
+  /** Where the view's 0 is, in the coordinates of the file. */
+  origin: Vector = [0, 0, 0];
+  onDrawn: (drawn: number, total: number) => void = () => undefined;
+  private readonly renderer: WebGLRenderer;
+  private readonly controls: OrbitControls;
+  private readonly scene = new Scene();
+  private readonly overlays: Object3D[] = [];
+  private readonly target: WebGLRenderTarget;
+  private readonly screen = new Scene();
+  private readonly screenCamera = new OrthographicCamera(-1, 1, 1, -1, 0, 1);
+  private readonly eyeDome: ShaderMaterial;
+  private sphere = new Sphere(new Vector3(), 1);
+  private budget = MOVING_START;
+  private lastMotion = -Infinity;
+  private lastFrame = 0;
+  private requested = false;
+  private diameter = 1;
+  private sizeFactor = 1;
+
+  constructor(private readonly canvas: HTMLCanvasElement) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: false, preserveDrawingBuffer: true });
+    this.camera.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.zoomToCursor = true;
+    this.controls.addEventListener("change", () => this.moved());
+    this.target = new WebGLRenderTarget(1, 1, { minFilter: NearestFilter, magFilter: NearestFilter });
+    this.target.depthTexture = new DepthTexture(1, 1, UnsignedIntType);
+    this.eyeDome = new ShaderMaterial({
+      vertexShader: SCREEN_VERTEX,
+      fragmentShader: EYE_DOME_FRAGMENT,
+      depthTest: false,
+      depthWrite: false,
+      uniforms: {
+        colours: { value: this.target.texture },
+        depths: { value: this.target.depthTexture },
+        pixel: { value: new Vector2() },
+        near: { value: 1 },
+        far: { value: 1 },
+        strength: { value: EYE_DOME },
+        background: { value: new Color() },
+      },
+    });
+    this.screen.add(new Mesh(new PlaneGeometry(2, 2), this.eyeDome));
+    new ResizeObserver(() => this.resized()).observe(canvas);
+    this.resized();
+  }
+
+  get size(): { width: number; height: number } {
+    return { width: this.canvas.clientWidth || 1, height: this.canvas.clientHeight || 1 };
+  }
+
+  private resized(): void {
+    const { width, height } = this.size;
+    const ratio = Math.min(window.devicePixelRatio, 2);
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(width, height, false);
+    this.target.setSize(width * ratio, height * ratio);
+    this.eyeDome.uniforms.pixel.value.set(1 / width, 1 / height);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.render();
+  }
+
+  setBackground(css: string): void {
+    // Colours are drawn as they are, without conversion.
+    const [r, g, b] = (css.match(/\d+(\.\d+)?/g) ?? ["255", "255", "255"]).map(Number);
+    this.eyeDome.uniforms.background.value.setRGB(r / 255, g / 255, b / 255);
+    this.render();
+  }
+
+  /** Takes everything away. */
+  clear(): void {
+    for (const layer of this.layers) {
+      this.scene.remove(layer.group);
+      layer.dispose();
+    }
+    this.layers.length = 0;
+    for (const overlay of this.overlays) this.scene.remove(overlay);
+    this.overlays.length = 0;
+  }
+
+  add(layer: PointLayer): void {
+    this.layers.push(layer);
+    this.scene.add(layer.group);
+  }
+
+  addOverlay(object: Object3D): void {
+    this.overlays.push(object);
+    this.scene.add(object);
+  }
+
+  /** Diameter of a point where it is large, in the cloud's unit. */
+  setPointSize(diameter: number): void {
+    this.diameter = diameter;
+    this.render();
+  }
+
+  /** Draws points larger or smaller by a factor. */
+  scalePoints(factor: number): void {
+    this.sizeFactor = factor;
+    this.render();
+  }
+
+  setShading(eyeDome: boolean, normals: boolean): void {
+    this.eyeDome.uniforms.strength.value = eyeDome ? EYE_DOME : 0;
+    for (const { material } of this.layers) material.uniforms.shading.value = normals ? 1 : 0;
+    this.render();
+  }
+
+  /** Shows all points, from in front and above, or from a direction. */
+  fit(from: Vector = [0.45, -1, 0.62]): void {
+    this.resized();
+    const box = new Box3();
+    for (const layer of this.layers) box.union(layer.box.clone().applyMatrix4(layer.group.matrixWorld));
+    for (const overlay of this.overlays) box.expandByObject(overlay);
+    if (box.isEmpty()) return;
+    this.sphere = box.getBoundingSphere(new Sphere());
+    const distance = this.distanceFor(box, new Vector3(...from).normalize());
+    this.controls.target.copy(this.sphere.center);
+    this.camera.position
+      .set(...from)
+      .normalize()
+      .multiplyScalar(distance)
+      .add(this.sphere.center);
+    this.controls.maxDistance = 20 * this.sphere.radius;
+    this.controls.minDistance = 1e-4 * this.sphere.radius;
+    this.controls.update();
+    this.moved();
+  }
+
+  /** How far away in a direction from the middle of a box all of its corners are in view. */
+  private distanceFor(box: Box3, towards: Vector3): number {
+    const up = Math.tan((this.camera.fov * Math.PI) / 360);
+    const right = new Vector3().crossVectors(this.camera.up, towards).normalize();
+    const above = new Vector3().crossVectors(towards, right);
+    const half = box.getSize(new Vector3()).multiplyScalar(0.5);
+    let distance = 1e-6;
+    for (let corner = 0; corner < 8; corner++) {
+      const at = new Vector3(
+        ...[1, 2, 4].map((bit, axis) => (corner & bit ? 1 : -1) * half.getComponent(axis)),
+      );
+      const across = Math.max(
+        Math.abs(at.dot(right)) / (up * this.camera.aspect),
+        Math.abs(at.dot(above)) / up,
+      );
+      distance = Math.max(distance, at.dot(towards) + MARGIN * across);
+    }
+    return distance;
+  }
+
+  get state(): ViewState {
+    return { position: this.camera.position.toArray(), target: this.controls.target.toArray() };
+  }
+
+  set state({ position, target }: ViewState) {
+    this.camera.position.set(...position);
+    this.controls.target.set(...target);
+    this.controls.update();
+    this.moved();
+  }
+
+  /** Turns about what is looked at, by angles in radians, and comes nearer by a factor. */
+  turn(azimuth: number, elevation: number, factor = 1): void {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    const length = offset.length() * factor;
+    const up = Math.min(Math.max(Math.asin(offset.z / offset.length()) + elevation, -1.55), 1.55);
+    const around = Math.atan2(offset.y, offset.x) + azimuth;
+    offset.set(Math.cos(up) * Math.cos(around), Math.cos(up) * Math.sin(around), Math.sin(up));
+    this.camera.position.copy(this.controls.target).addScaledVector(offset, length);
+    this.controls.update();
+    this.moved();
+  }
+
+  pick(x: number, y: number): Picked | null {
+    const { width, height } = this.size;
+    return pick(this.visible, this.camera, width, height, x, y);
+  }
+
+  inView(layer: PointLayer): Uint32Array<ArrayBuffer> {
+    const { width, height } = this.size;
+    return inView(layer, this.camera, width, height);
+  }
+
+  /** Where a point is on the screen, in pixels; null behind the viewer. */
+  onScreen(layer: PointLayer, point: number): [number, number] | null {
+    const { width, height } = this.size;
+    const seen = projector(layer, this.camera, width, height)(point, new Vector3());
+    return seen.z > 0 ? [seen.x, seen.y] : null;
+  }
+
+  private get visible(): PointLayer[] {
+    return this.layers.filter((layer) => layer.group.visible);
+  }
+
+  private moved(): void {
+    this.lastMotion = performance.now();
+    this.render();
+  }
+
+  /** Draws soon. */
+  render(): void {
+    if (this.requested) return;
+    this.requested = true;
+    requestAnimationFrame((now) => {
+      this.requested = false;
+      this.draw(now);
+    });
+  }
+
+  private draw(now: number): void {
+    const moving = now - this.lastMotion < REST;
+    if (moving) {
+      const took = now - this.lastFrame;
+      if (took < 1000 && took > SLOW_FRAME) this.budget = Math.max(MOVING_LEAST, 0.8 * this.budget);
+      else if (took < FAST_FRAME) this.budget = Math.min(MOST_STILL, 1.15 * this.budget);
+    }
+    this.lastFrame = now;
+    const { height } = this.size;
+    const ratio = this.renderer.getPixelRatio();
+    const pixelsPerUnit = (height * ratio) / (2 * Math.tan((this.camera.fov * Math.PI) / 360));
+    this.setDepthRange();
+    const layers = this.visible;
+    const wanted = layers.map((layer) => layer.wanted(this.camera, pixelsPerUnit));
+    const all = wanted.flat().reduce((sum, count) => sum + count, 0);
+    const share = Math.min(1, (moving ? this.budget : MOST_STILL) / Math.max(all, 1));
+    let drawn = 0;
+    layers.forEach((layer, i) => {
+      const { uniforms } = layer.material;
+      uniforms.pixelsPerUnit.value = pixelsPerUnit;
+      // Fewer points are drawn larger, so that surfaces stay closed.
+      uniforms.diameter.value = (this.diameter * this.sizeFactor) / Math.sqrt(Math.max(share, 0.05));
+      uniforms.leastSize.value = Math.max(1, 1.4 * ratio * Math.min(this.sizeFactor, 3));
+      drawn += layer.draw(wanted[i], share);
+    });
+    this.renderer.setRenderTarget(this.target);
+    this.renderer.clear();
+    this.renderer.render(this.scene, this.camera);
+    this.renderer.setRenderTarget(null);
+    this.renderer.render(this.screen, this.screenCamera);
+    this.onDrawn(
+      drawn,
+      layers.reduce((sum, { layer }) => sum + layer.count, 0),
+    );
+    if (moving) setTimeout(() => this.render(), REST + 10);
+  }
+
+  /** Near and far planes that hold everything, close together. */
+  private setDepthRange(): void {
+    const distance = this.camera.position.distanceTo(this.sphere.center);
+    const far = distance + 1.5 * this.sphere.radius;
+    const near = Math.max(
+      distance - 1.5 * this.sphere.radius,
+      2e-3 * this.camera.position.distanceTo(this.controls.target),
+      1e-5 * far,
+    );
+    this.camera.near = near;
+    this.camera.far = far;
+    this.camera.updateProjectionMatrix();
+    this.eyeDome.uniforms.near.value = near;
+    this.eyeDome.uniforms.far.value = far;
+  }
+
+  /** The picture as a PNG file. */
+  picture(): Promise<Blob> {
+    this.draw(performance.now() + REST);
+    return new Promise((resolve, reject) => {
+      this.canvas.toBlob(
+        (blob) => (blob === null ? reject(new Error("no picture")) : resolve(blob)),
+        "image/png",
+      );
+    });
+  }
+}
