@@ -6,6 +6,7 @@ any manner goes on with the tiles that have no record, and ``manifest.json`` can
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -14,7 +15,8 @@ from typing import Any
 from surfsig.errors import InvalidInputError
 from surfsig.files.atomic import replacing
 
-MANIFEST, RECORDS, STORE = "manifest.json", "records", "store"
+MANIFEST, RECORDS, STORE, PIECES = "manifest.json", "records", "store", "pieces"
+TABLES = ("surfaces.json", "surfaces.csv", "surfaces.parquet")
 VERSION = 1
 
 Record = dict[str, Any]
@@ -82,7 +84,7 @@ def check_output(
         )
 
 
-_OWN = {STORE, RECORDS, ".lock"}
+_OWN = {STORE, RECORDS, PIECES, ".lock"}
 
 
 def _shown(value: Any) -> str:
@@ -155,4 +157,16 @@ def cleared(out: Path) -> None:
     for name in names:
         # A name from a manifest is that of a file in this very folder.
         (out / Path(name).name).unlink(missing_ok=True)
-    (out / MANIFEST).unlink(missing_ok=True)
+    remove_pieces(out)
+    for name in (*TABLES, MANIFEST):
+        (out / name).unlink(missing_ok=True)
+
+
+def remove_pieces(out: Path) -> None:
+    """Remove what tiles have found, once it is in parts and tables, and nothing else."""
+    folder = out / PIECES
+    for pattern in ("*.npz", ".*.npz.*.tmp"):
+        for file in folder.glob(pattern):
+            file.unlink(missing_ok=True)
+    with contextlib.suppress(OSError):
+        folder.rmdir()

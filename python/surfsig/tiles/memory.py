@@ -23,6 +23,9 @@ POINT_BYTES = 260
 """What a point of a tile needs beside twice its row: the index, the columns of the extraction, and what the
 writer holds; an estimate, too."""
 
+SURFACE_POINT_BYTES = 900
+"""The same where surfaces are found."""
+
 WHOLE_BYTES = 190
 """What a point needs, its extraction and its file included, where all points are in memory at once."""
 
@@ -62,7 +65,7 @@ def memory_bytes(memory: int | float | str | None) -> int:
     return int(size)
 
 
-def points_per_tile(memory: int, row_bytes: int) -> int:
+def points_per_tile(memory: int, row_bytes: int, point_bytes: int = POINT_BYTES) -> int:
     """Give the points of a tile that one process with so many bytes can work on.
 
     Parameters
@@ -71,9 +74,11 @@ def points_per_tile(memory: int, row_bytes: int) -> int:
         Of the process.
     row_bytes
         Of a row in the store.
+    point_bytes
+        What a point needs beside its rows.
     """
     room = memory - BASE_BYTES
-    return int(min(max(room / (POINT_BYTES + 2 * row_bytes), FEWEST_POINTS), MOST_POINTS))
+    return int(min(max(room / (point_bytes + 2 * row_bytes), FEWEST_POINTS), MOST_POINTS))
 
 
 def total_bytes() -> int:

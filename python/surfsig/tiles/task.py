@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
@@ -141,22 +141,10 @@ class ExtractTask:
         if self.numbers:
             columns["point_number"] = points.numbers[points.own].astype(np.int64)
         del points
-        part = self.out / f"tile_{tile:06d}{self.suffix}"
-        notes = {name: str(value) for name, value in self.how.arguments().items() if value is not None}
-        write(part, cloud, columns, notes=notes)
-        record = {
-            "tile": tile,
-            "part": part.name,
-            "bytes": part.stat().st_size,
-            "sha256": _hash(part),
-            "points": len(cloud),
-            "read": read + wider,
-            "status": status,
-            "seconds": round(time.perf_counter() - clock, 3),
-            "processor_seconds": round(time.process_time() - processor, 3),
-        }
-        write_record(self.out, record)
-        return record
+        more = {"read": read + wider, "status": status}
+        return write_part(
+            self.out, tile, self.suffix, cloud, columns, self.how.arguments(), more, (clock, processor)
+        )
 
     def _extracted(
         self, tile: int, points: TileCloud, threads: int | None, progress: TilePoints | None
@@ -206,6 +194,45 @@ class ExtractTask:
             progress=progress,
         )
         return found, beyond.astype(np.int64)
+
+
+def write_part(
+    out: Path,
+    tile: int,
+    suffix: str,
+    cloud: PointCloud,
+    columns: Mapping[str, Any],
+    notes: Mapping[str, Any],
+    more: Mapping[str, Any],
+    began: tuple[float, float],
+) -> Record:
+    """Write a tile's part, and its record.
+
+    Parameters
+    ----------
+    out, tile, suffix
+        The folder, the tile's number, and the ending of parts.
+    cloud, columns, notes
+        As for `surfsig.write`.
+    more
+        What else the record says.
+    began
+        When the task began, by the clock and in processor time.
+    """
+    part = out / f"tile_{tile:06d}{suffix}"
+    write(part, cloud, columns, notes={name: str(note) for name, note in notes.items() if note is not None})
+    record = {
+        "tile": tile,
+        "part": part.name,
+        "bytes": part.stat().st_size,
+        "sha256": _hash(part),
+        "points": len(cloud),
+        **more,
+        "seconds": round(time.perf_counter() - began[0], 3),
+        "processor_seconds": round(time.process_time() - began[1], 3),
+    }
+    write_record(out, record)
+    return record
 
 
 def _hash(path: Path) -> str:
