@@ -30,7 +30,7 @@ def pipe(rng: np.random.Generator, count: int, y: float, x: tuple[float, float])
     )
 
 
-def plant(seed: int = 3, density: float = 80.0) -> tuple[PointCloud, NDArray[np.int64]]:
+def plant(seed: int = 3, density: float = 50.0) -> tuple[PointCloud, NDArray[np.int64]]:
     """A wall, two parallel pipes, and a wall with a step of eight standard deviations in its middle.
 
     The second array says which of the five surfaces each point is of.

@@ -110,7 +110,7 @@ def test_tables_have_all_surfaces(found: surfsig.TileSurfaces) -> None:
     for one, other in zip(again, found, strict=True):
         np.testing.assert_array_equal(one.covariance, other.covariance)
         np.testing.assert_array_equal(one.axis, other.axis)
-        assert one.interval == other.interval
+        np.testing.assert_array_equal(one.interval, other.interval)
     # What was needed on the way is gone.
     assert not (folder / "pieces").exists()
 
@@ -164,6 +164,7 @@ def test_a_run_that_was_stopped_goes_on(
     assert len(done) == number
 
 
+@pytest.mark.slow
 def test_the_number_of_threads_changes_nothing(
     found: surfsig.TileSurfaces, paths: list[Path], tmp_path: Path
 ) -> None:
@@ -225,15 +226,14 @@ def test_a_small_surface_on_a_border_is_whole(tmp_path: Path) -> None:
 
 
 def test_tiles_without_points_and_surfaces(tmp_path: Path) -> None:
-    rng = np.random.default_rng(2)
-    surfsig.write(tmp_path / "noise.ply", surfsig.PointCloud(rng.uniform(0, 1, (3000, 3))))
-    found = run(tmp_path / "noise.ply", tmp_path / "out", tiles=3)
-    assert len(found) == 0
-    assert found.summary() == "no surface found in 3,000 points"
-    assert (found.read().fields["surface"] == -1).all()
-    few = surfsig.PointCloud(np.array([[0.0, 0, 0], [1, 0, 0], [np.nan, 0, 0]]))
+    few = surfsig.PointCloud(np.array([[0.0, 0, 0], [1, 0, 0], [7, 1, 1], [8, 2, 5], [np.nan, 0, 0]]))
     surfsig.write(tmp_path / "few.ply", few)
-    assert len(run(tmp_path / "few.ply", tmp_path / "few", tiles=1)) == 0
+    for tiles in (1, 2, 9):
+        found = run(tmp_path / "few.ply", tmp_path / f"{tiles}", tiles=tiles)
+        assert len(found) == 0
+        assert found.summary() == "no surface found in 5 points"
+        assert (found.read().fields["surface"] == -1).all()
+        assert found.tiles.is_finished
 
 
 def test_a_file_that_cannot_be_read_costs_its_tiles_only(tmp_path: Path) -> None:
@@ -248,17 +248,17 @@ def test_a_file_that_cannot_be_read_costs_its_tiles_only(tmp_path: Path) -> None
     found = surfsig.TileSurfaces(tmp_path / "out")
     assert not found.tiles.is_finished
     assert [surface.kind for surface in found].count("cylinder") == 2
-    assert max(surface.length for surface in found) == pytest.approx(45, abs=2)
+    assert max(surface.length for surface in found) > 35
 
 
 def test_the_command_line(paths: list[Path], tmp_path: Path) -> None:
     command: list[str | Path] = [sys.executable, "-m", "surfsig.cli", "surfaces", *paths]
     out = tmp_path / "out"
-    more: list[str | Path] = ["--tiles", "3", "--kinds", "cylinder", "--csv", tmp_path / "t.csv"]
+    more: list[str | Path] = ["--tiles", "3", "--csv", tmp_path / "t.csv"]
     done = subprocess.run([*command, "-o", out, *more], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert "2 surfaces: 2 cylinders" in done.stdout
-    assert len((tmp_path / "t.csv").read_text().splitlines()) == 3
+    assert "5 surfaces: 3 planes, 2 cylinders" in done.stdout
+    assert len((tmp_path / "t.csv").read_text().splitlines()) == 6
     assert (out / "tile_000002.laz").exists()
     for wrong, why in (
         (["-o", out, "--recurrences"], "--recurrences is not for work in tiles"),

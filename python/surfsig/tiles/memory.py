@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import os
 import re
+import sys
 from pathlib import Path
 
 from surfsig.errors import InvalidInputError
@@ -109,6 +112,18 @@ def resident_bytes() -> int:
     except (OSError, ValueError, IndexError):
         return 0
     return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+def release_memory() -> None:
+    """Give memory that is free within this process back to the system, where its C library can (glibc).
+
+    Arrays of tiles come and go in several sizes; what lies between them would be kept, and add up from tile to
+    tile.
+    """
+    if sys.platform != "linux":
+        return
+    with contextlib.suppress(AttributeError, OSError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _limit_of_group() -> int | None:
