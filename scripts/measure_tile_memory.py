@@ -2,8 +2,9 @@
 
 python scripts/measure_tile_memory.py
 
-Simulated towns of several sizes are worked on as one tile, each in a process of its own; the peak of its resident
-memory grows with the points as a line does. What rows of the store take is known, and left out of its slope.
+Simulated towns of several sizes are worked on as one tile, each in a process of its own; the peak of its
+resident memory grows with the points as a line does. What rows of the store take is known, and left out of its
+slope.
 """
 
 from __future__ import annotations
@@ -50,13 +51,22 @@ def main() -> None:
         for job in JOBS:
             peaks = []
             for millions in MILLIONS:
-                command = [sys.executable, __file__, job, folder / f"{millions}", folder / f"{job} {millions}"]
+                command: list[str | Path] = [
+                    sys.executable,
+                    __file__,
+                    job,
+                    folder / f"{millions}",
+                    folder / f"{job} {millions}",
+                ]
                 done = subprocess.run(command, check=True, capture_output=True, text=True)
                 peak, row = map(int, done.stdout.split())
                 peaks.append(peak)
                 print(f"{job}, {millions} million points: {peak / 1e6:.0f} MB, {row} bytes a row")
             slope, base = np.polyfit(1e6 * np.array(MILLIONS), peaks, 1)
-            print(f"{job}: {base / 1e6:.0f} MB and {slope:.0f} bytes a point, {slope - 2 * row:.0f} beside two rows")
+            print(
+                f"{job}: {base / 1e6:.0f} MB and {slope:.0f} bytes a point, "
+                f"{slope - 2 * row:.0f} beside two rows"
+            )
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from tile_scenes import RADIUS, check_equal, town, town_files
 
 import surfsig
 from surfsig import PointCloud
-from surfsig.tiles import extraction as module
+from surfsig.tiles import job as module
 from surfsig.tiles.plan import Plan
 
 SIZES: tuple[dict[str, Any], ...] = ({"radius": 0.25}, {"neighbors": 40}, {"radius": "auto"})

@@ -22,9 +22,8 @@ TILES = 12
 
 
 def run(paths: Any, out: Path, **more: Any) -> surfsig.TileSurfaces:
-    return surfsig.find_surfaces_tiles(
-        paths, out, **{"tiles": TILES, "numbers": True, "suffix": ".npz", **more}
-    )
+    asked = {"tiles": TILES, "numbers": True, "suffix": ".npz", "halo": 1.5, **more}
+    return surfsig.find_surfaces_tiles(paths, out, **asked)
 
 
 @pytest.fixture(scope="module")
@@ -234,6 +233,31 @@ def test_tiles_without_points_and_surfaces(tmp_path: Path) -> None:
         assert found.summary() == "no surface found in 5 points"
         assert (found.read().fields["surface"] == -1).all()
         assert found.tiles.is_finished
+
+
+@pytest.mark.parametrize(
+    ("task", "tile"), [("FindTask", 4), pytest.param("MeasureTask", 2, marks=pytest.mark.slow)]
+)
+def test_a_tile_that_fails_once_is_as_if_it_never_had(
+    found: surfsig.TileSurfaces, paths: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    task: str, tile: int,
+) -> None:  # fmt: skip
+    module: Any = surface_pieces if task == "FindTask" else surface_parts
+    work = getattr(module, task).__call__
+
+    def fails(self: Any, number: int, *rest: Any) -> Any:
+        return {"tile": number, "error": "no"} if number == tile else work(self, number, *rest)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(getattr(module, task), "__call__", fails)
+        with pytest.raises(TilesFailedError, match=f"1 of {TILES} tiles could not be read.*tile {tile}: no"):
+            run(paths, tmp_path / "out")
+        # What all others have is there.
+        assert len(surfsig.TileSurfaces(tmp_path / "out")) >= 5
+    run(paths, tmp_path / "out")
+    assert hashes(tmp_path / "out") == hashes(found.tiles.folder)
+    for table in ("surfaces.json", "surfaces.csv"):
+        assert (tmp_path / "out" / table).read_text() == (found.tiles.folder / table).read_text()
 
 
 def test_a_file_that_cannot_be_read_costs_its_tiles_only(tmp_path: Path) -> None:

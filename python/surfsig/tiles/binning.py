@@ -114,6 +114,7 @@ def _made(
         removed(folder)
         survey = surveyed(source, reading, unreadable, share)
         plan = cut(survey)
+        release_memory()
         try:
             store = _binned(survey, source, folder, plan, binning)
         except LostFileError as lost:

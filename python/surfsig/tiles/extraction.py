@@ -136,7 +136,7 @@ def extract_tiles(
     job = TileJob(
         Source.of(source, ReadOptions(box=box, unit=unit, columns=columns)),
         folder,
-        {**how.arguments(), "suffix": suffix, "numbers": bool(numbers)},
+        {"task": "curvature", **how.arguments(), "suffix": suffix, "numbers": bool(numbers)},
         TileJob.store_in(folder, store),
         None if tiles is None else whole_number(tiles, "tiles", MOST_TILES),
         thread_count(threads),

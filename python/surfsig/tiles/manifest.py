@@ -7,6 +7,7 @@ any manner goes on with the tiles that have no record, and ``manifest.json`` can
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -162,10 +163,31 @@ def cleared(out: Path) -> None:
         (out / name).unlink(missing_ok=True)
 
 
-def remove_pieces(out: Path) -> None:
-    """Remove what tiles have found, once it is in parts and tables, and nothing else."""
+def remove_records(out: Path) -> None:
+    """Remove the records of all parts, which must be written again."""
+    for file in (out / RECORDS).glob("*.json"):
+        file.unlink()
+
+
+def is_new(out: Path, name: str, values: Any) -> bool:
+    """Tell whether pieces are being made into something else than a run before made of them, and note it."""
+    path = out / PIECES / f"{name}.sha256"
+    digest = hashlib.sha256(json.dumps(values).encode()).hexdigest()
+    try:
+        if path.read_text() == digest:
+            return False
+    except FileNotFoundError:
+        pass
+    with replacing(path) as file:
+        file.write(digest.encode())
+    return True
+
+
+def remove_pieces(out: Path, *stages: str) -> None:
+    """Remove what some stages, or all, have found of tiles; nothing else."""
     folder = out / PIECES
-    for pattern in ("*.npz", ".*.npz.*.tmp"):
+    patterns = [f"{stage}_*.npz" for stage in stages] or ["*.npz", "*.sha256", ".*.tmp"]
+    for pattern in patterns:
         for file in folder.glob(pattern):
             file.unlink(missing_ok=True)
     with contextlib.suppress(OSError):

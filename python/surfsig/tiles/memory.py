@@ -18,13 +18,18 @@ LARGE_SHARE = 0.25
 """Share of the machine's memory beyond which an input is worked on in tiles: files may be compressed, and an
 extraction needs more than the cloud."""
 
-BASE_BYTES = 330 << 20
-"""What a process needs beside its tile: Python, the libraries, blocks of LAZ that are decoded and written. An
-estimate; with it, and the next one, benchmarks/scale.py stayed below what it was given."""
+BASE_BYTES = 240_000_000
+"""What a process needs beside its tile: Python, the libraries, blocks of LAZ that are decoded and written.
+scripts/measure_tile_memory.py measured 162 MB; up to 75 more were seen with 64 files and twelve tiles one after
+the other."""
 
-POINT_BYTES = 260
+LEAST_BYTES = 600_000_000
+"""Memory below which nothing is begun: while files are binned, blocks of half a million points and rows that
+wait for their tiles' files take up to 510 MB, whatever the tiles are."""
+
+POINT_BYTES = 120
 """What a point of a tile needs beside twice its row: the index, the columns of the extraction, and what the
-writer holds; an estimate, too."""
+writer holds. scripts/measure_tile_memory.py measured 104 to 110, robust or not."""
 
 SURFACE_POINT_BYTES = 900
 """The same where surfaces are found."""
@@ -62,9 +67,8 @@ def memory_bytes(memory: int | float | str | None) -> int:
         size = float(memory)
     if not 0 < size < 2**60:
         raise InvalidInputError(f"memory must be a size such as '4GB', not {memory!r:.40}")
-    least = BASE_BYTES + FEWEST_POINTS * 2 * POINT_BYTES
-    if size < least:
-        raise InvalidInputError(f"memory must be at least {least >> 20} MiB, not {memory!r:.40}")
+    if size < LEAST_BYTES:
+        raise InvalidInputError(f"memory must be at least {LEAST_BYTES // 1_000_000} MB, not {memory!r:.40}")
     return int(size)
 
 
@@ -117,8 +121,8 @@ def resident_bytes() -> int:
 def release_memory() -> None:
     """Give memory that is free within this process back to the system, where its C library can (glibc).
 
-    Arrays of tiles come and go in several sizes; what lies between them would be kept, and add up from tile to
-    tile.
+    Arrays of tiles come and go in several sizes; what lies between them would be kept, and add up from tile
+    to tile.
     """
     if sys.platform != "linux":
         return

@@ -18,7 +18,14 @@ from surfsig.files.read_file import ReadOptions
 from surfsig.shapes.surface import Kind
 from surfsig.surfaces.search import AskedSurfaces, asked_surfaces
 from surfsig.tiles.job import MOST_TILES, TileJob, TileProgress, TileRun, TileTask
-from surfsig.tiles.manifest import PIECES, TABLES, finished_records, remove_pieces
+from surfsig.tiles.manifest import (
+    PIECES,
+    TABLES,
+    finished_records,
+    is_new,
+    remove_pieces,
+    remove_records,
+)
 from surfsig.tiles.memory import SURFACE_POINT_BYTES
 from surfsig.tiles.nearest import distances_in
 from surfsig.tiles.source import Source
@@ -106,7 +113,7 @@ def find_surfaces_tiles(
     folder = Path(out).absolute()
     formats.of_output(folder / f"tile{suffix}")
     arguments = {
-        "surfaces": True,
+        "task": "surfaces",
         "min_points": asked.min_points,
         "noise": asked.noise,
         "kinds": list(asked.kinds),
@@ -147,13 +154,19 @@ def _work(run: TileRun, asked: AskedSurfaces, halo: float | None) -> None:
     place = (float(origin[0]), float(origin[1]), float(origin[2]))
     reach = _halo(source, halo)
     _stage(run, FindTask(source, out, asked, reach, place), "finding surfaces", "found")
-    _stage(run, LinkTask(source, out, reach), "comparing", "links")
     there = [tile for tile in everything if tile not in run.failed]
+    if is_new(out, "there", there):
+        # Of a tile that could not be read before its neighbours know nothing.
+        remove_pieces(out, "links", "sums")
+    _stage(run, LinkTask(source, out, reach), "comparing", "links")
     joined_pieces(out, source.plan, there).write(out)
     _stage(run, MeasureTask(source, out, place), "measuring", "sums")
     there = [tile for tile in everything if tile not in run.failed]
     surfaces, numbers = assembled(out, there, origin)
     write_surfaces(out, surfaces, numbers)
+    if is_new(out, "surfaces", surfaces):
+        # The parts, if there are any, have other numbers.
+        remove_records(out)
     task = WriteTask(source, out, run.job.arguments["suffix"], run.job.arguments["numbers"])
     records = run.write_parts(task, "writing")
     write_tables(out, surfaces, sum(record.get("points", 0) for record in records))
