@@ -170,7 +170,7 @@ def in_tiles(paths: Sequence[Path], out: Path, memory: str, tiles: int | None = 
 def today_row(points: int, folder: Path, paths: Sequence[Path]) -> Row:
     """Measure what users of jakteristics do with the files, where it is installed."""
     try:
-        import jakteristics  # noqa: F401
+        import jakteristics  # type: ignore[import-not-found]  # noqa: F401
     except ModuleNotFoundError:
         return (f"{points:,}", "not measured: jakteristics is not installed", "", "", "")
     found = measured("today", folder / "today", *paths)
@@ -213,8 +213,8 @@ def size_row(
 
 
 def as_today(paths: Sequence[Path], out: Path) -> Results:
-    """Compute four shape features of each file by jakteristics, as its users do: a file a time, without a halo."""
-    import jakteristics  # type: ignore[import-not-found]
+    """Compute four shape features of each file by jakteristics, as its users do, without a halo."""
+    import jakteristics
     import laspy
 
     out.mkdir()

@@ -3,8 +3,8 @@
 python scripts/measure_tile_memory.py
 
 Simulated towns of several sizes are worked on as one tile, each in a process of its own; the peak of its
-resident memory grows with the points as a line does. What rows of the store take is known, and left out of its
-slope.
+resident memory grows with the points as a line does. What rows of the store take is known, and left out of
+its slope.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
+from surfsig.files.atomic import naming
 from surfsig.progress import ProgressCallback
 from surfsig.tiles.lock import locked
 from surfsig.tiles.memory import release_memory
@@ -200,7 +201,8 @@ class _Bins:
 
     def flush(self) -> None:
         for (tile, layout), parts in sorted(self._waiting.items()):
-            with rows_path(self._folder, tile, layout).open("ab") as file:
+            path = rows_path(self._folder, tile, layout)
+            with naming(path), path.open("ab") as file:
                 for rows in parts:
                     file.write(rows.data)
         self._waiting, self._bytes = {}, 0
@@ -215,7 +217,7 @@ def _sort(path: Path, layout: Layout, origins: NDArray[np.float64]) -> None:
     rows = rows_from(path, dtype, 0, path.stat().st_size // dtype.itemsize)
     columns = np.ascontiguousarray(coordinates(rows, origins).T)
     starts, lowest, highest = [0], [], []
-    with path.open("r+b") as file:
+    with naming(path), path.open("r+b") as file:
         for block in _blocks(columns):
             file.write(rows.take(block).data)
             starts.append(starts[-1] + len(block))

@@ -15,8 +15,9 @@ from typing import Any
 
 from surfsig.errors import InvalidInputError
 from surfsig.files.atomic import replacing
+from surfsig.files.paths import MANIFEST
 
-MANIFEST, RECORDS, STORE, PIECES = "manifest.json", "records", "store", "pieces"
+RECORDS, STORE, PIECES = "records", "store", "pieces"
 TABLES = ("surfaces.json", "surfaces.csv", "surfaces.parquet")
 VERSION = 1
 

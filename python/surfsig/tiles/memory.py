@@ -20,8 +20,8 @@ extraction needs more than the cloud."""
 
 BASE_BYTES = 240_000_000
 """What a process needs beside its tile: Python, the libraries, blocks of LAZ that are decoded and written.
-scripts/measure_tile_memory.py measured 162 MB; up to 75 more were seen with 64 files and twelve tiles one after
-the other."""
+scripts/measure_tile_memory.py measured 162 MB; up to 75 more were seen with 64 files and twelve tiles one
+after the other."""
 
 LEAST_BYTES = 600_000_000
 """Memory below which nothing is begun: while files are binned, blocks of half a million points and rows that
