@@ -32,8 +32,8 @@ POINT_BYTES = 120
 writer holds. scripts/measure_tile_memory.py measured 104 to 110, robust or not."""
 
 SURFACE_POINT_BYTES = 300
-"""The same where surfaces are found: the graph of neighbours, normals, labels. The script measured 244 with half
-a million and one million points."""
+"""The same where surfaces are found: neighbours, normals, labels. The script measured 244, with half
+a million and with a million points."""
 
 WHOLE_BYTES = 190
 """What a point needs, its extraction and its file included, where all points are in memory at once."""

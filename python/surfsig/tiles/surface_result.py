@@ -104,9 +104,19 @@ class TileSurfaces:
     def read(self, box: ArrayLike | None = None) -> PointCloud:
         """Read the points in a box with all columns, as `TileDataset.read` does.
 
+        Parameters
+        ----------
+        box
+            (2, 3), its lowest and its highest corner; all points by default.
+
         Returns
         -------
         PointCloud
+
+        Raises
+        ------
+        OSError, FileFormatError
+            If a part that has points there is missing or broken.
         """
         return self.tiles.read(box)
 
@@ -129,6 +139,11 @@ class TileSurfaces:
     def write_csv(self, path: str | Path) -> None:
         """Write the table as text with commas, as `Surfaces.write_csv` does.
 
+        Parameters
+        ----------
+        path
+            Where to write.
+
         Raises
         ------
         OSError
@@ -138,6 +153,11 @@ class TileSurfaces:
 
     def write_excel(self, path: str | Path) -> None:
         """Write the table as an Excel workbook, as `Surfaces.write_excel` does.
+
+        Parameters
+        ----------
+        path
+            Where to write.
 
         Raises
         ------

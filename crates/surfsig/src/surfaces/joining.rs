@@ -125,9 +125,9 @@ struct Group {
     count: usize,
     /// What is compared of several pieces; of one, that is its own.
     several: Option<Comparison>,
-    /// Every so manieth point of the pieces' samples, ...
+    /// Every `stride`-th point of the pieces' samples, ...
     points: Vec<Vector>,
-    /// ... and how manieth: the same of all pieces.
+    /// ... with the same stride in all pieces.
     stride: usize,
     /// Pairs of a member and another piece, and whether they overlap.
     pairs: Vec<(usize, usize, bool)>,
@@ -139,6 +139,10 @@ impl Group {
         Self { members: vec![piece], count, several: None, points: Vec::new(), stride: 1, pairs: Vec::new() }
     }
 }
+
+/// In which order groups are tried: those with points in common first, and the largest of them. Whether there are none in
+/// common, the points, and the number of the group.
+type Order = (bool, Reverse<usize>, usize);
 
 /// All pieces, and what they have become.
 struct Joining<'a> {
@@ -160,7 +164,7 @@ impl Joining<'_> {
         let mut failed: FxHashMap<usize, (usize, usize)> = FxHashMap::default();
         loop {
             let count = self.groups[own].count;
-            let mut next: BTreeMap<(bool, Reverse<usize>, usize), Vec<(usize, usize)>> = BTreeMap::new();
+            let mut next: BTreeMap<Order, Vec<(usize, usize)>> = BTreeMap::new();
             for &(member, piece, overlap) in &self.groups[own].pairs {
                 let group = self.group_of[piece];
                 let others = self.groups[group].count;
@@ -168,7 +172,6 @@ impl Joining<'_> {
                     .get(&group)
                     .is_none_or(|&(own, other)| count >= GROWN * own || others >= GROWN * other);
                 if group != own && is_new {
-                    // Those with points in common first, and the largest of them.
                     next.entry((!overlap, Reverse(others), group)).or_default().push((member, piece));
                 }
             }
