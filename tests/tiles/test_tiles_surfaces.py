@@ -149,9 +149,10 @@ def test_a_run_that_was_stopped_goes_on(
     counted(surface_pieces.FindTask, "find", 3)
     counted(surface_parts.MeasureTask, "measure", 5)
     counted(surface_parts.WriteTask, "write", 7)
-    for _ in range(3):
+    # What is begun goes on with its own tiles, whatever is asked for then.
+    for tiles in (TILES, 3, 2 * TILES):
         with pytest.raises(KeyboardInterrupt):
-            run(paths, tmp_path / "out")
+            run(paths, tmp_path / "out", tiles=tiles)
     run(paths, tmp_path / "out")
     # Each was stopped once and worked on once.
     for name, stop in (("find", 3), ("measure", 5), ("write", 7)):

@@ -20,6 +20,7 @@ from surfsig.tiles.binning import cut_by_count, store_of
 from surfsig.tiles.copc import copc_of
 from surfsig.tiles.lock import locked
 from surfsig.tiles.manifest import (
+    PIECES,
     RECORDS,
     STORE,
     Record,
@@ -138,8 +139,9 @@ class TileJob:
         most_points = partial(points_per_tile, budget, point_bytes=self.point_bytes)
         cut = cut_by_count(most_points, self.tiles)
         manifest = read_manifest(self.out)
-        if manifest is not None and any((self.out / RECORDS).glob("*.json")):
-            # Once parts are there, the tiles are what they are.
+        is_begun = any((self.out / RECORDS).glob("*.json")) or any((self.out / PIECES).glob("*.npz"))
+        if manifest is not None and is_begun:
+            # Once parts, or pieces of surfaces, are there, the tiles are what they are.
             plan = Plan.from_json(manifest["plan"])
             cut, fits = (lambda survey: plan), (lambda store: bool(store.plan.root == plan.root))
         if not self.needs_numbers and self.store == self.out / STORE:
