@@ -56,6 +56,16 @@ def test_tiles_have_the_bits_of_the_whole(
     check_equal(parts_of(paths, tmp_path / "out", 16, **how), whole, found)
 
 
+@pytest.mark.parametrize("how", [{}, {"robust": True}, {"neighbors": 20}], ids=str)
+def test_an_extraction_at_all_points_has_the_same_bits(
+    paths: list[Path], whole: PointCloud, tmp_path: Path, how: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # As where halos are small beside tiles.
+    monkeypatch.setattr("surfsig.tiles.task.MOSTLY_OWN", 0.0)
+    found = surfsig.extract(whole, RADIUS, **how)
+    check_equal(parts_of(paths, tmp_path / "out", 6, radius=RADIUS, **how), whole, found)
+
+
 @pytest.mark.parametrize("tiles", [1, 4, 37])
 def test_any_number_of_tiles(paths: list[Path], whole: PointCloud, tmp_path: Path, tiles: int) -> None:
     found = surfsig.extract(whole, RADIUS)
