@@ -198,9 +198,9 @@ class ExtractTask:
             threads=threads,
             progress=progress,
         )
-        columns, beyond = found.columns(), beyond.astype(np.int64)
+        columns = found.columns()
         if not is_for_all or len(at) == len(points.cloud):
-            return columns, beyond
+            return columns, beyond.astype(np.int64)
         is_beyond = np.zeros(len(points.cloud), np.bool_)
         is_beyond[beyond] = True
         some = {name: values.take(at, axis=0) for name, values in columns.items()}
