@@ -48,24 +48,28 @@ impl SurfaceSums {
     pub fn new(near: &Primitive, points: &[[f64; 3]], limit: f64) -> Self {
         let points: Vec<Vector> = points.iter().map(|&point| Vector::from(point)).collect();
         let (chart, parameters) = (near.chart(), near.kind.parameters());
-        let residuals: Vec<f64> = points.iter().map(|point| chart.distance(point)).collect();
+        let rows: Vec<_> = points.iter().map(|point| chart.distance_and_derivatives(point)).collect();
+        let mut whole = vec![0.0; parameters * (parameters + 1)];
+        rows.iter().for_each(|(distance, by)| add_row(&mut whole, parameters, *distance, by));
+        let BlockEquations { normal, gradient } = equations(&whole);
+        // What the surface is off by, all points have in common: it is no error of theirs.
+        let step = normal.cholesky().map(|normal| -normal.solve(&gradient));
+        let mut residuals: Vec<f64> = rows.iter().map(|(distance, _)| *distance).collect();
+        if let Some(step) = step {
+            for (residual, (_, by)) in residuals.iter_mut().zip(&rows) {
+                *residual += step.iter().zip(by).map(|(step, by)| step * by).sum::<f64>();
+            }
+        }
         let cut = Blocks::of_residuals(&points, &residuals, parameters);
         let count = cut.labels.iter().max().map_or(0, |last| last + 1);
         let mut blocks = vec![vec![0.0; parameters * (parameters + 1)]; count];
-        for (point, &label) in points.iter().zip(&cut.labels) {
-            let (distance, by) = chart.distance_and_derivatives(point);
-            let (gradient, normal) = blocks[label].split_at_mut(parameters);
-            for i in 0..parameters {
-                gradient[i] += by[i] * distance;
-                for j in 0..parameters {
-                    normal[parameters * i + j] += by[i] * by[j];
-                }
-            }
+        for ((distance, by), &label) in rows.iter().zip(&cut.labels) {
+            add_row(&mut blocks[label], parameters, *distance, by);
         }
         Self {
             count: points.len(),
-            squares: residuals.iter().map(|residual| residual * residual).sum(),
-            at_limit: residuals.iter().filter(|distance| is_at_limit(**distance, limit)).count(),
+            squares: rows.iter().map(|(distance, _)| distance * distance).sum(),
+            at_limit: rows.iter().filter(|(distance, _)| is_at_limit(*distance, limit)).count(),
             crossing: cut.crossing,
             blocks,
         }
@@ -109,6 +113,17 @@ impl SurfaceSums {
         let fitted = near.chart().moved(step.as_slice()).upward();
         let found = described(&fitted, deviation, Vector::zeros(), sure);
         Some(FoundSurface { count: self.count, ..found })
+    }
+}
+
+/// Adds a point's distance, and its derivatives, to J^T d and J^T J.
+fn add_row(sums: &mut [f64], parameters: usize, distance: f64, by: &[f64]) {
+    let (gradient, normal) = sums.split_at_mut(parameters);
+    for i in 0..parameters {
+        gradient[i] += by[i] * distance;
+        for j in 0..parameters {
+            normal[parameters * i + j] += by[i] * by[j];
+        }
     }
 }
 
