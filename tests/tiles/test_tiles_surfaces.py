@@ -156,8 +156,8 @@ def test_a_run_that_was_stopped_goes_on(
     run(paths, tmp_path / "out")
     # Each was stopped once and worked on once.
     for name, stop in (("find", 3), ("measure", 5), ("write", 7)):
-        tiles = [tile for what, tile in done if what == name]
-        assert sorted(tiles) == sorted([*range(TILES), stop]), name
+        worked_on = [tile for what, tile in done if what == name]
+        assert sorted(worked_on) == sorted([*range(TILES), stop]), name
     assert hashes(tmp_path / "out") == hashes(found.tiles.folder)
     number = len(done)
     run(paths, tmp_path / "out")

@@ -27,9 +27,10 @@ LEAST_BYTES = 600_000_000
 """Memory below which nothing is begun: while files are binned, blocks of half a million points and rows that
 wait for their tiles' files take up to 510 MB, whatever the tiles are."""
 
-POINT_BYTES = 120
+POINT_BYTES = 200
 """What a point of a tile needs beside twice its row: the index, the columns of the extraction, and what the
-writer holds. scripts/measure_tile_memory.py measured 104 to 110, robust or not."""
+writer holds. scripts/measure_tile_memory.py measured 104 to 110 with one tile, robust or not; of two with 2.5
+million points each, one after the other, the peak was 875 MB, which asks for 190."""
 
 SURFACE_POINT_BYTES = 300
 """The same where surfaces are found: neighbours, normals, labels. The script measured 244, with half
