@@ -6,7 +6,6 @@ python benchmarks/scale.py --points 20 60 200 --write
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import os
 import resource
@@ -17,6 +16,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ import numpy as np
 from machine import measured_here
 from numpy.typing import NDArray
 from report import Results, Row, markdown_table, measured_on, publish, verdict
+from scale_bits import same_bits
 
 import surfsig
 from surfsig.tiles.memory import memory_bytes
@@ -37,16 +38,20 @@ MOST_PROCESSOR_TIME, MOST_SPREAD = 1.25, 0.20
 """What is to be reached: processor time over that of the whole cloud, and by how much memory may differ."""
 _SAMPLES_PER_SECOND = 20
 
+FILES_OF_BITS = 8
+PROCESSOR_TIME = "processor seconds per million points"
+
 COLUMNS = (
     "points",
     "tiles",
     "peak memory, MB",
-    "processor seconds per million points",
+    PROCESSOR_TIME,
     "of the whole cloud in memory",
     "their ratio",
     "points read per point",
     "seconds",
-    "scheduling, ms a tile",
+    "of these first look and binning",
+    "scheduling and start, ms a tile",
 )
 
 
@@ -143,20 +148,46 @@ def in_memory(paths: Sequence[Path], out: Path) -> Results:
 
 def in_tiles(paths: Sequence[Path], out: Path, memory: str, tiles: int | None = None) -> Results:
     """Do the same tile by tile."""
-    found = surfsig.extract_tiles(list(paths), out, RADIUS, memory=memory, tiles=tiles)
+    began, prepared = time.perf_counter(), 0.0
+
+    def told(what: str, done: int, total: int) -> None:
+        nonlocal prepared
+        if what in ("reading", "binning"):
+            prepared = time.perf_counter() - began
+
+    found = surfsig.extract_tiles(list(paths), out, RADIUS, memory=memory, tiles=tiles, progress=told)
     records = found.manifest["tiles"]
     total = sum(record.get("seconds", 0.0) for record in records)
     return {
         "tiles": len(records),
         "read": sum(record["read"] for record in records),
         "task_seconds": total,
+        "prepared_seconds": prepared,
         "bytes": sum(record["bytes"] for record in records),
     }
 
 
-def size_row(points: int, folder: Path, memory: str, whole: Results | None) -> tuple[Row, Results, Results]:
+def today_row(points: int, folder: Path, paths: Sequence[Path]) -> Row:
+    """Measure what users of jakteristics do with the files, where it is installed."""
+    try:
+        import jakteristics  # type: ignore[import-not-found]  # noqa: F401
+    except ModuleNotFoundError:
+        return (f"{points:,}", "not measured: jakteristics is not installed", "", "", "")
+    found = measured("today", folder / "today", *paths)
+    shutil.rmtree(folder / "today")
+    return (
+        f"{points:,}",
+        f"jakteristics {version('jakteristics')}, file by file, without a halo: 4 features",
+        f"{found['peak_bytes'] / 1e6:,.0f}",
+        f"{1e6 * found['processor_seconds'] / points:.2f}",
+        f"{found['seconds']:,.0f}",
+    )
+
+
+def size_row(
+    points: int, folder: Path, paths: Sequence[Path], memory: str, whole: Results | None
+) -> tuple[Row, Results, Results]:
     """Measure one size, beside the whole cloud in memory where that fits (else beside a smaller one)."""
-    paths = make_input(folder / "in", points, FILES)
     if whole is None:
         whole = measured("whole", folder / "whole.laz", *paths) | {"points": points}
         (folder / "whole.laz").unlink()
@@ -164,7 +195,7 @@ def size_row(points: int, folder: Path, memory: str, whole: Results | None) -> t
     cost = 1e6 * tiles["processor_seconds"] / points
     whole_cost = 1e6 * whole["processor_seconds"] / whole["points"]
     beside = "" if whole["points"] == points else f" (at {whole['points']:,} points)"
-    scheduling = (tiles["seconds"] - tiles["task_seconds"]) / tiles["tiles"]
+    scheduling = (tiles["seconds"] - tiles["task_seconds"] - tiles["prepared_seconds"]) / tiles["tiles"]
     row = (
         f"{points:,}",
         f"{tiles['tiles']}",
@@ -174,59 +205,30 @@ def size_row(points: int, folder: Path, memory: str, whole: Results | None) -> t
         f"{cost / whole_cost:.2f}",
         f"{tiles['read'] / points:.3f}",
         f"{tiles['seconds']:,.0f}",
-        f"{1000 * scheduling:,.0f} (first look and binning included)",
+        f"{tiles['prepared_seconds']:,.0f}",
+        f"{1000 * scheduling:,.0f}",
     )
-    shutil.rmtree(folder)
+    shutil.rmtree(folder / "out")
     return row, tiles, whole
 
 
-def sorted_hash(found: surfsig.TileDataset) -> str:
-    """Give the SHA-256 of all columns of a result, its points in the order of the input."""
-    cloud = found.read()
-    order = np.argsort(cloud.fields["point_number"])
-    digest = hashlib.sha256()
-    for name in sorted(set(cloud.fields) - {"file"}):
-        digest.update(name.encode() + np.ascontiguousarray(cloud.fields[name][order]).tobytes())
-    digest.update(np.ascontiguousarray(cloud.points[order]).tobytes())
-    return digest.hexdigest()
+def as_today(paths: Sequence[Path], out: Path) -> Results:
+    """Compute four shape features of each file by jakteristics, as its users do, without a halo."""
+    import jakteristics
+    import laspy
 
-
-def same_bits(folder: Path, points: int) -> list[Row]:
-    """Hash the results of several manners of cutting and working."""
-    paths = make_input(folder / "in", points, 8)
-    rows: list[Row] = []
-
-    def add(what: str, out: Path, **more: Any) -> None:
-        surfsig.extract_tiles(
-            paths, out, RADIUS, numbers=True, suffix=".npz", store=folder / f"{out.name} store", **more
+    out.mkdir()
+    names = ["linearity", "planarity", "sphericity", "verticality"]
+    for path in paths:
+        las = laspy.read(path)
+        features = jakteristics.compute_features(
+            np.ascontiguousarray(las.xyz), RADIUS, num_threads=os.cpu_count(), feature_names=names
         )
-        rows.append((what, sorted_hash(surfsig.TileDataset(out))[:16]))
-        shutil.rmtree(out)
-        shutil.rmtree(folder / f"{out.name} store")
-
-    cloud = surfsig.read(paths)
-    columns = surfsig.extract(cloud, RADIUS).columns() | {"point_number": np.arange(len(cloud))}
-    digest = hashlib.sha256()
-    values = {**{name: v for name, v in cloud.fields.items() if name != "file"}, **columns}
-    for name in sorted(values):
-        digest.update(name.encode() + np.ascontiguousarray(values[name]).tobytes())
-    digest.update(np.ascontiguousarray(cloud.points).tobytes())
-    rows.append(("whole cloud in memory", digest.hexdigest()[:16]))
-    for tiles in (1, 4, 16, 64):
-        add(f"{tiles} tiles", folder / f"{tiles}", tiles=tiles)
-    try:
-        import distributed
-    except ModuleNotFoundError:
-        rows.append(("two workers of a Dask cluster", "not measured: Dask is not installed"))
-    else:
-        with (
-            distributed.LocalCluster(  # type: ignore[no-untyped-call]
-                2, threads_per_worker=1, dashboard_address=None
-            ) as cluster,
-            distributed.Client(cluster) as client,  # type: ignore[no-untyped-call]
-        ):
-            add("16 tiles, two workers of a Dask cluster", folder / "dask", tiles=16, client=client)
-    return rows
+        for name, values in zip(names, features.T, strict=True):
+            las.add_extra_dim(laspy.ExtraBytesParams(name, np.float32))
+            las[name] = values
+        las.write(out / path.name)
+    return {}
 
 
 def main() -> None:
@@ -244,12 +246,16 @@ def main() -> None:
     if arguments.job == "whole":
         print(json.dumps(in_memory([Path(path) for path in arguments.rest[1:]], Path(arguments.rest[0]))))
         return
+    if arguments.job == "today":
+        print(json.dumps(as_today([Path(path) for path in arguments.rest[1:]], Path(arguments.rest[0]))))
+        return
     if arguments.job == "tiles":
         out, memory, *paths = arguments.rest
         print(json.dumps(in_tiles([Path(path) for path in paths], Path(out), memory)))
         return
     results: Results = measured_here()
     rows: list[Row] = []
+    todays: list[Row] = []
     peaks: list[int] = []
     ratios: list[float] = []
     whole: Results | None = None
@@ -258,15 +264,22 @@ def main() -> None:
         for millions in sorted(arguments.points):
             points = int(1e6 * millions)
             known = None if millions <= arguments.most_whole else whole
-            row, tiles, whole = size_row(points, folder / f"{points}", arguments.memory, known)
+            size = folder / f"{points}"
+            paths = make_input(size / "in", points, FILES)
+            if known is None:
+                todays.append(today_row(points, size, paths))
+            row, tiles, whole = size_row(points, size, paths, arguments.memory, known)
+            shutil.rmtree(size)
             rows.append(row)
             peaks.append(tiles["peak_bytes"])
             ratios.append(float(row[5]))
             print(" | ".join(row), file=sys.stderr)
-        bits = same_bits(folder / "bits", int(1e6 * arguments.same_bits))
+        bits = same_bits(
+            folder, make_input(folder / "bits", int(1e6 * arguments.same_bits), FILES_OF_BITS), RADIUS
+        )
     limit = memory_bytes(arguments.memory)
     spread = max(peaks) / min(peaks) - 1
-    equal = len({value for _, value in bits if not value.startswith("not")}) == 1
+    equal = len({value for _, value in bits}) == 1
     targets = [
         (
             f"Peak memory of all processes with --memory {arguments.memory}",
@@ -303,6 +316,10 @@ def main() -> None:
         [
             markdown_table(("target", "wanted", "reached", ""), targets),
             markdown_table(COLUMNS, rows),
+            markdown_table(
+                ("points", "as a user would do it today", "peak memory, MB", PROCESSOR_TIME, "seconds"),
+                todays,
+            ),
             markdown_table(("how", "SHA-256 of the sorted result, its first digits"), bits),
             "\n".join(f"- {line}" for line in notes),
         ]

@@ -63,7 +63,7 @@ def test_surfaces(
     c: CInterface, scene: NDArray[np.float64], dtype: Any, origin: Any, how: dict[str, Any]
 ) -> None:
     points = scene.astype(dtype)
-    labels, entries = _surfsig.find_surfaces(
+    labels, entries, _, _ = _surfsig.find_surfaces(
         points,
         origin=[0.0, 0.0, 0.0] if origin is None else origin.tolist(),
         kinds=[KINDS[kind] for kind in how.get("kinds", range(5))],

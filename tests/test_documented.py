@@ -81,8 +81,10 @@ def test_a_function_says_what_it_takes_gives_and_refuses(function: Function) -> 
 def test_a_class_says_what_each_of_its_values_is(kind: type) -> None:
     found = sections(kind)
     told = documented(found.get("Attributes", []) + found.get("Parameters", []))
-    if dataclasses.is_dataclass(kind):
-        told |= words_below(kind)
+    for base in kind.__mro__:
+        # Those that are inherited are told where they are declared.
+        if dataclasses.is_dataclass(base):
+            told |= words_below(base)
     assert found[""]
     for name in [*getattr(kind, "__dataclass_fields__", {}), *vars(kind)]:
         if name[0] != "_" and name not in told:

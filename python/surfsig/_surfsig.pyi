@@ -1,7 +1,7 @@
 """The compiled core: what it offers to the package."""
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, BinaryIO, Literal, final
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, BinaryIO, Literal, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -610,7 +610,17 @@ def find_surfaces(
     noise: float | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> tuple[NDArray[np.int32], list[dict[str, Any]]]: ...
+) -> tuple[NDArray[np.int32], list[dict[str, Any]], NDArray[np.bool_], float]: ...
+def join_surface_pieces(
+    pieces: Sequence[tuple[Mapping[str, Any], NDArray[np.float64], float]],
+    pairs: Sequence[tuple[int, int, bool]],
+) -> tuple[NDArray[np.uint32], list[dict[str, Any]]]: ...
+
+_SurfaceSums: TypeAlias = tuple[int, float, int, float, NDArray[np.float64]]
+
+def surface_sums(surface: Mapping[str, Any], points: NDArray[np.float64]) -> _SurfaceSums: ...
+def added_sums(sums: Sequence[_SurfaceSums]) -> _SurfaceSums: ...
+def surface_of_sums(surface: Mapping[str, Any], sums: Sequence[_SurfaceSums]) -> dict[str, Any] | None: ...
 def fit_primitive(
     points: NDArray[np.float64],
     kind: str,

@@ -9,7 +9,7 @@ from tile_scenes import RADIUS, check_equal, town, town_files
 
 import surfsig
 from surfsig import PointCloud
-from surfsig.tiles import extraction as module
+from surfsig.tiles import job as module
 from surfsig.tiles.plan import Plan
 
 SIZES: tuple[dict[str, Any], ...] = ({"radius": 0.25}, {"neighbors": 40}, {"radius": "auto"})
@@ -54,6 +54,16 @@ def test_tiles_have_the_bits_of_the_whole(
 ) -> None:
     found = surfsig.extract(whole, **how)
     check_equal(parts_of(paths, tmp_path / "out", 16, **how), whole, found)
+
+
+@pytest.mark.parametrize("how", [{}, {"robust": True}, {"neighbors": 20}], ids=str)
+def test_an_extraction_at_all_points_has_the_same_bits(
+    paths: list[Path], whole: PointCloud, tmp_path: Path, how: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # As where halos are small beside tiles.
+    monkeypatch.setattr("surfsig.tiles.task.MOSTLY_OWN", 0.0)
+    found = surfsig.extract(whole, RADIUS, **how)
+    check_equal(parts_of(paths, tmp_path / "out", 6, radius=RADIUS, **how), whole, found)
 
 
 @pytest.mark.parametrize("tiles", [1, 4, 37])

@@ -333,3 +333,16 @@ def test_points_of_the_parts_are_those_of_the_input(paths: list[Path], tmp_path:
         found = run(paths, tmp_path / "out", suffix=".npz")
     whole = surfsig.read(paths)
     check_equal(found.read(), whole, surfsig.extract(whole, RADIUS))
+
+
+def test_a_folder_of_tiles_is_a_source_of_its_parts(paths: list[Path], tmp_path: Path) -> None:
+    found = run(paths, tmp_path / "out", suffix=".parquet")
+    # Tables lie beside the parts, too.
+    for name in ("surfaces.csv", "surfaces.json", "surfaces.parquet"):
+        (tmp_path / "out" / name).write_text("x")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cloud = surfsig.read(tmp_path / "out")
+    assert len(cloud) == len(found) == 4000
+    again = surfsig.extract_tiles(tmp_path / "out", tmp_path / "again", 1.5, tiles=2)
+    assert len(again) == 4000

@@ -44,7 +44,9 @@ def check_same(found: PointCloud, expected: PointCloud) -> None:
             np.testing.assert_array_equal(mine, theirs)
 
 
-@pytest.mark.parametrize("suffix", [".laz", ".las", ".ply", ".xyz", ".csv", ".pcd", ".npz", ".parquet"])
+@pytest.mark.parametrize(
+    "suffix", [".laz", ".las", ".ply", ".xyz", ".csv", ".pcd", ".npz", ".parquet", ".e57"]
+)
 @pytest.mark.parametrize("files", [1, 3])
 def test_everything_is_what_read_gives(tmp_path: Path, suffix: str, files: int) -> None:
     paths = town_files(tmp_path / "in", 3000, suffix, files)
@@ -187,3 +189,11 @@ def test_a_first_look_that_misleads_is_made_again(tmp_path: Path) -> None:
     )
     assert looks != sorted(looks)
     assert max(store.counts) < 1.1 * 60_000 / 8
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    paths = town_files(tmp_path / "in", 3000)
+    monkeypatch.setattr("surfsig.tiles.binning.rows_path", lambda *_: Path("/dev/full"))
+    with pytest.raises(OSError, match="No space left on device: '/dev/full'"):
+        made(paths, tmp_path / "store")

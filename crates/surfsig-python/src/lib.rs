@@ -82,7 +82,7 @@ mod _surfsig {
     #[pymodule_export]
     use crate::registration::{RegistrationSettings, consistent_directions, free_directions, register};
     #[pymodule_export]
-    use crate::surfaces::find_surfaces;
+    use crate::surfaces::{added_sums, find_surfaces, join_surface_pieces, surface_of_sums, surface_sums};
     #[pymodule_export]
     use crate::visibility::{hidden_from, measured_from_origin};
 

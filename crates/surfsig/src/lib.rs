@@ -122,7 +122,10 @@ pub use simd::InstructionSet;
 pub use similarity::{GOOD, OPTIMAL, SimilarityClass, similarity};
 pub use spacing::point_spacing;
 pub use status::Status;
-pub use surfaces::{FEWEST_SURFACE_POINTS, FoundSurface, FoundSurfaces, SurfaceOptions, find_surfaces};
+pub use surfaces::{
+    FEWEST_SURFACE_POINTS, FoundSurface, FoundSurfaces, JoinedPieces, PiecePair, SurfaceOptions,
+    SurfacePiece, SurfaceSums, find_surfaces, join_surface_pieces,
+};
 pub use threads::with_threads;
 pub use visibility::{
     RangeImageSettings, SphericalRangeImage, Visibility, all_seen_from, hidden_from, measured_from_origin,

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
-import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -107,15 +105,18 @@ def print_columns(title: str, header: Sequence[str], rows: Sequence[Sequence[str
 
 def print_json(values: Mapping[str, Any]) -> None:
     """Print one JSON object on one line; what is not finite becomes null, which JSON knows."""
-    click.echo(json.dumps(_plain(values), allow_nan=False))
+    from surfsig.files.json_text import json_text
+
+    click.echo(json_text(values))
 
 
 def write_json(path: Path, values: Mapping[str, Any]) -> None:
     """Write one JSON object to a file, as `print_json` prints it."""
     from surfsig.files.atomic import replacing
+    from surfsig.files.json_text import json_text
 
     with replacing(path) as file:
-        file.write(json.dumps(_plain(values), allow_nan=False, indent=1).encode() + b"\n")
+        file.write(json_text(values, indent=1).encode() + b"\n")
 
 
 def number(value: float) -> str:
@@ -134,15 +135,3 @@ def quantity(value: float) -> str:
 def size_text(size: float) -> str:
     """Write bytes short: 1.5 GB."""
     return f"{quantity(size)}B"
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(name): _plain(part) for name, part in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(part) for part in value]
-    if hasattr(value, "tolist"):
-        return _plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -26,6 +26,7 @@ from surfsig.cli.options import (
 from surfsig.cli.tiles import (
     extract_in_tiles,
     is_tiled,
+    name_of,
     refuse_in_tiles,
     refuse_too_large,
     split_options,
@@ -164,7 +165,7 @@ def extract_command(
         )
         return
     file = files[0] if len(files) == 1 else files
-    told = str(files[0]) if len(files) == 1 else f"{files[0]} and {len(files) - 1} more"
+    told = name_of(files)
     check_writable(output)
     if report is not None:
         check_target(report)

@@ -21,8 +21,7 @@ def summary_of_many(path: Path) -> Summary | None:
         If a header cannot be read.
     """
     import surfsig
-    from surfsig.files.paths import files_meant
-    from surfsig.tiles.manifest import MANIFEST
+    from surfsig.files.paths import MANIFEST, files_meant
 
     if (path / MANIFEST).is_file():
         return _of_tiles(surfsig.TileDataset(path))

@@ -18,13 +18,23 @@ from surfsig.cli.options import (
     threads_option,
     words,
 )
+from surfsig.cli.tiled_surfaces import Tables, find_in_tiles
+from surfsig.cli.tiles import (
+    is_tiled,
+    name_of,
+    refuse_in_tiles,
+    refuse_too_large,
+    refuse_without_tiles,
+    split_options,
+    tile_options,
+)
 
 if TYPE_CHECKING:
     from surfsig import Recurrences, Surfaces
 
 
 @click.command("surfaces", no_args_is_help=True)
-@click.argument("file", type=CLOUD)
+@click.argument("files", type=CLOUD, nargs=-1, required=True)
 @result_options("the surfaces with all errors", "a view that turns, and the table")
 @click.option(
     "--min-points",
@@ -53,11 +63,12 @@ if TYPE_CHECKING:
 @click.option("--csv", "csv_file", type=CLOUD, metavar="FILE.csv", help="Write the table of surfaces as CSV.")
 @click.option("--excel", type=CLOUD, metavar="FILE.xlsx", help="Write the table of surfaces for Excel.")
 @click.option("--recurrences", is_flag=True, help="Say which objects and surfaces occur more than once, too.")
+@tile_options
 @input_options
 @threads_option
 @quiet_option
 def surfaces_command(
-    file: Path,
+    files: tuple[Path, ...],
     output: Path | None,
     json_file: Path | None,
     report: Path | None,
@@ -70,9 +81,9 @@ def surfaces_command(
     recurrences: bool,
     threads: int | None,
     quiet: bool,
-    **reading: Any,
+    **more: Any,
 ) -> None:
-    """Find the planes, spheres, cylinders, cones and tori in FILE, with their radii and errors.
+    """Find the planes, spheres, cylinders, cones and tori in FILES, with their radii and errors.
 
     Nothing needs to be set. The output has the input's points and fields, and surface (its number, -1 for
     none), surface_kind and point_class (1 plane, 2 cylinder, 3 sphere, 4 cone, 5 torus, 6 saddle, 7 edge,
@@ -82,12 +93,17 @@ def surfaces_command(
     Pipes that are joined end to end, by elbows or where their axes meet, are rows of the table and
     pipe_runs of JSON.
 
+    Where the output is a folder, clouds need not fit into memory: they are worked on in tiles, surfaces go on
+    from tile to tile, and a second call goes on where the first was stopped. The folder then has the table
+    as surfaces.json, .csv and .parquet, too.
+
     \b
     Examples:
       surfsig surfaces scan.pcd
       surfsig surfaces scan.pcd --recurrences
       surfsig surfaces scan.pcd -o labelled.ply --report report.html
       surfsig surfaces scan.pcd --export model.glb --csv table.csv
+      surfsig surfaces city/*.laz -o out/ --memory 4GB
       surfsig surfaces part.ply --unit mm --kinds plane,cylinder --json - | jq '.surfaces[].radius'
     """  # noqa: D301
     import surfsig
@@ -96,15 +112,26 @@ def surfaces_command(
     from surfsig.surfaces.table import excel_library
     from surfsig.surfaces.wording import run_rows
 
+    shown = on_terminal() and not quiet
+    tiling, reading = split_options(more)
+    if output is not None and is_tiled(output, tiling):
+        refuse_in_tiles(report=report, export=export, recurrences=recurrences, **reading)
+        asked = {"min_points": min_points, "noise": noise, "kinds": kinds, "threads": threads}
+        tables = Tables(json_file, csv_file, excel)
+        find_in_tiles(files, output, asked, tiling, reading, tables, shown, quiet)
+        return
+    refuse_without_tiles(tiling)
+    file = files[0] if len(files) == 1 else files
+    told = name_of(files)
     on_stdout = check_results(output, json_file, report, export, csv_file, excel)
     if export is not None:
         check_export(export)
     if excel is not None:
         excel_library()
-    shown = on_terminal() and not quiet
+    refuse_too_large(file, told)
     with progress_bar("reading", "bytes", shown=shown) as progress:
         cloud = surfsig.read(file, progress=progress, **reading)
-    warn_of_missing_returns(cloud, str(file))
+    warn_of_missing_returns(cloud, told)
     with progress_bar("finding surfaces", "points", shown=shown) as progress:
         found = surfsig.find_surfaces(
             cloud,
@@ -115,7 +142,7 @@ def surfaces_command(
             progress=progress,
         )
     if not len(found):
-        warnings.warn(f"{file}: {found.summary()}", stacklevel=1)
+        warnings.warn(f"{told}: {found.summary()}", stacklevel=1)
     recurring = None
     if recurrences:
         with progress_bar("comparing", "pairs", shown=shown) as progress:
@@ -127,26 +154,26 @@ def surfaces_command(
         with progress_bar("writing", "points", shown=shown) as progress:
             surfsig.write(output, cloud, columns, progress=progress)
     if report is not None:
-        found.write_report(report, title=f"Surfaces of {file.name}")
+        found.write_report(report, title=f"Surfaces of {files[0].name if len(files) == 1 else told}")
     if csv_file is not None:
         found.write_csv(csv_file)
     if excel is not None:
         found.write_excel(excel)
     if on_stdout:
-        print_json(_values(file, found, recurring))
+        print_json(_values(told, found, recurring))
     elif json_file is not None:
-        write_json(json_file, _values(file, found, recurring))
+        write_json(json_file, _values(told, found, recurring))
     if len(found) and not on_stdout and not quiet:
         header, rows = found.table()
-        print_columns(f"{file}: {found.summary()}", header, [*rows, *run_rows(found.pipe_runs())])
+        print_columns(f"{told}: {found.summary()}", header, [*rows, *run_rows(found.pipe_runs())])
     if recurring is not None and not on_stdout and not quiet:
-        print_columns(f"{file}: {recurring.summary()}", *recurring.table())
+        print_columns(f"{told}: {recurring.summary()}", *recurring.table())
     # The last, for where no surface was found there is none to write, which is an error.
     if export is not None:
         found.export(export)
 
 
-def _values(file: Path, found: Surfaces, recurring: Recurrences | None) -> dict[str, Any]:
+def _values(file: str, found: Surfaces, recurring: Recurrences | None) -> dict[str, Any]:
     """Give what a program may want to know."""
     import numpy as np
 
@@ -154,7 +181,7 @@ def _values(file: Path, found: Surfaces, recurring: Recurrences | None) -> dict[
 
     counts = np.bincount(found.classes, minlength=len(PointClass)).tolist()
     values = {
-        "file": str(file),
+        "file": file,
         "summary": found.summary(),
         "points": len(found.cloud),
         "classes": {kind.name.lower(): counts[kind] for kind in PointClass},

@@ -1,4 +1,4 @@
-"""Where the output of `surfsig extract` is a folder: options, progress and summary of work in tiles."""
+"""Where an output is a folder: options, progress and summary of work in tiles."""
 
 from __future__ import annotations
 
@@ -87,6 +87,24 @@ def is_tiled(output: Path, tiling: Mapping[str, Any]) -> bool:
     return False
 
 
+def name_of(files: Sequence[Path]) -> str:
+    """Name files in a line."""
+    return str(files[0]) if len(files) == 1 else f"{files[0]} and {len(files) - 1} more"
+
+
+def refuse_without_tiles(tiling: Mapping[str, Any]) -> None:
+    """Refuse options of tiles where there is no folder for these.
+
+    Raises
+    ------
+    click.UsageError
+        Naming the option.
+    """
+    asked = next((name for name in _OPTIONS if tiling[name]), None)
+    if asked is not None:
+        raise click.UsageError(f"--{asked.rstrip('_')} needs a folder for the tiles: -o out/")
+
+
 def refuse_in_tiles(**options: Any) -> None:
     """Refuse what is not done in tiles.
 
@@ -140,6 +158,20 @@ def refuse_too_large(source: Any, told: str) -> None:
     )
 
 
+def tile_arguments(tiling: Mapping[str, Any], reading: Mapping[str, Any]) -> dict[str, Any]:
+    """Name options of tiles and of reading as functions call them."""
+    return {
+        "memory": tiling["memory"],
+        "tiles": tiling["tiles"],
+        "client": tiling["scheduler"],
+        "suffix": f".{tiling['format_'] or 'laz'}",
+        "numbers": tiling["numbers"],
+        "store": tiling["store"],
+        "restart": tiling["restart"],
+        **{name: reading[name] for name in ("box", "unit", "columns")},
+    }
+
+
 def extract_in_tiles(
     files: Sequence[Path],
     output: Path,
@@ -153,19 +185,12 @@ def extract_in_tiles(
     import surfsig
 
     clock = time.perf_counter()
-    with _tile_progress(shown) as progress:
+    with tile_progress(shown) as progress:
         found = surfsig.extract_tiles(
             files[0] if len(files) == 1 else files,
             output,
             **how,
-            memory=tiling["memory"],
-            tiles=tiling["tiles"],
-            client=tiling["scheduler"],
-            suffix=f".{tiling['format_'] or 'laz'}",
-            numbers=tiling["numbers"],
-            store=tiling["store"],
-            restart=tiling["restart"],
-            **{name: reading[name] for name in ("box", "unit", "columns")},
+            **tile_arguments(tiling, reading),
             progress=progress,
         )
     summary = _summary(found, time.perf_counter() - clock)
@@ -200,7 +225,7 @@ def _rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 @contextlib.contextmanager
-def _tile_progress(shown: bool) -> Iterator[TileProgress | None]:
+def tile_progress(shown: bool) -> Iterator[TileProgress | None]:
     """Show one bar after the other, with rate, time left, and the memory of this process."""
     if not shown:
         yield None
@@ -214,7 +239,7 @@ def _tile_progress(shown: bool) -> Iterator[TileProgress | None]:
 
     class Rate(progress.ProgressColumn):
         def render(self, task: progress.Task) -> Any:
-            unit = "points" if task.description == "extracting" else "bytes"
+            unit = "bytes" if task.description in ("reading", "binning") else "points"
             return Text(f"{quantity(task.speed)} {unit}/s" if task.speed else "")
 
     class Memory(progress.ProgressColumn):

@@ -86,6 +86,15 @@ def _create_beside(target: Path, path: Path) -> tuple[int, Path]:
         raise _named(error, path) from error
 
 
+@contextlib.contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Let what goes wrong in the block name a file: a write to a full disk does not."""
+    try:
+        yield
+    except OSError as error:
+        raise _named(error, path) from error
+
+
 def _named(error: OSError, path: Path) -> OSError:
     return type(error)(error.errno, error.strerror or str(error), str(path)) if error.errno else error
 

@@ -17,6 +17,12 @@ PathLike = str | os.PathLike[str]
 Paths = PathLike | Iterable[PathLike]
 
 
+MANIFEST = "manifest.json"
+"""What says of a folder of tiles how it was made."""
+
+_PART = re.compile(r"tile_\d{6,}\.\w+")
+
+
 def natural(path: Path) -> list[tuple[int, int, str]]:
     """Compare runs of digits as numbers; the name itself decides between 1 and 01."""
     words = re.split(r"(\d+)", str(path))
@@ -25,6 +31,8 @@ def natural(path: Path) -> list[tuple[int, int, str]]:
 
 def files_of_folder(folder: Path) -> list[Path]:
     """Give the clouds of a folder: the files of the commonest kind, as poses and times may lie beside them.
+
+    Of a folder of tiles, which has a manifest, those are the parts.
 
     Raises
     ------
@@ -39,6 +47,10 @@ def files_of_folder(folder: Path) -> list[Path]:
     inside = [file for file in folder.iterdir() if file.is_file() and file.name[0] != "."]
     if not inside:
         raise FileFormatError(f"{folder}: holds no files")
+    if (folder / MANIFEST).is_file():
+        parts = [file for file in inside if _PART.fullmatch(file.name)]
+        if parts:
+            return sorted(parts, key=natural)
     kinds = Counter(file.suffix.lower() for file in inside)
     kind = max(sorted(kinds), key=lambda suffix: kinds[suffix])
     others = len(inside) - kinds[kind]

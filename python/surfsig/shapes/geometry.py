@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import dataclass
 
@@ -98,12 +99,11 @@ def in_plane(placement: Placement, points: Array) -> tuple[float, float]:
 
     One of its sides is along the convex hull; of points that are nearly on a line, along that line.
     """
-    from scipy.spatial import ConvexHull, QhullError
+    from scipy.spatial import QhullError
 
     flat = points @ np.column_stack(axes_across(placement.axis))
     try:
-        some = _near_hull(flat)
-        hull = some[ConvexHull(some).vertices]
+        hull = _hull(flat)
     except QhullError:
         _, _, directions = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)
         longer, shorter = np.ptp(flat @ directions.T, axis=0).tolist()
@@ -115,6 +115,36 @@ def in_plane(placement: Placement, points: Array) -> tuple[float, float]:
     best = (along * beside).argmin()
     sides = sorted((float(along[best]), float(beside[best])), reverse=True)
     return sides[0], sides[1]
+
+
+def _hull(flat: Array) -> Array:
+    """Give the corners of the convex hull of points (n, 2); a `QhullError` where they are on a line."""
+    from scipy.spatial import ConvexHull
+
+    some = _near_hull(flat)
+    hull: Array = some[ConvexHull(some).vertices]
+    return hull
+
+
+_OUTLINE = 2000
+"""Points of an outline that are evenly chosen, and angles at which it has a point."""
+
+
+def outline(placement: Placement, points: Array) -> Array:
+    """Give a few points on or near a surface that extend as far as all (n, 3) do: along it, and round it."""
+    from scipy.spatial import QhullError
+
+    if placement.kind == "plane":
+        across = np.column_stack(axes_across(placement.axis))
+        with contextlib.suppress(QhullError):
+            return _hull(points @ across) @ across.T
+    chosen = np.arange(0, len(points), math.ceil(len(points) / _OUTLINE))
+    if placement.kind not in ("plane", "sphere"):
+        heights = placement.heights(points)
+        bins = ((placement.turns(points) + math.pi) * (_OUTLINE / (2 * math.pi))).astype(np.int64)
+        _, of_bins = np.unique(bins, return_index=True)
+        chosen = np.union1d(of_bins, [heights.argmin(), heights.argmax()])
+    return points[chosen]
 
 
 _DIRECTIONS = 8

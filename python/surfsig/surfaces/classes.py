@@ -75,10 +75,7 @@ def classify(
     around = extract(cloud, neighbors=NEIGHBORS, at=rest, threads=threads)
     for members, surface in zip(members_of(labels, len(surfaces)), surfaces, strict=True):
         classes[members] = PointClass[surface.kind.upper()]
-        spacing = np.sqrt(surface.area / surface.count)
-        confidence[members] = _belonging(
-            deviations[members], max(surface.deviation, FLOOR * spacing)
-        ) * _evidence(surface)
+        confidence[members] = belonging(surface, deviations[members])
     classes[rest], confidence[rest] = _without_surface(around, _typical_noise(around, surfaces, noise))
     return classes, confidence
 
@@ -99,12 +96,16 @@ def members_of(labels: NDArray[np.int32], count: int) -> list[NDArray[np.intp]]:
     return np.split(order, np.searchsorted(labels[order], np.arange(count + 1)))[1:-1]
 
 
-def _belonging(distances: NDArray[np.float64], deviation: float) -> NDArray[np.float64]:
-    """Give the probability of normal noise against that of anything else, equally likely at `NEAR`."""
+def belonging(surface: Surface, distances: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give how sure it is that points are a surface's, by their distances; see `Surfaces.confidence`.
+
+    That is the probability of normal noise against that of anything else, equally likely at `NEAR`.
+    """
     from scipy.special import expit
 
-    belonging: NDArray[np.float64] = expit(0.5 * (NEAR**2 - (distances / deviation) ** 2))
-    return belonging
+    deviation = max(surface.deviation, FLOOR * np.sqrt(surface.area / surface.count))
+    sure: NDArray[np.float64] = expit(0.5 * (NEAR**2 - (distances / deviation) ** 2)) * _evidence(surface)
+    return sure
 
 
 def _evidence(surface: Surface) -> float:

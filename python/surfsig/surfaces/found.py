@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,7 +21,7 @@ from surfsig.surfaces.export import export
 from surfsig.surfaces.pipe_runs import PipeRun, find_pipe_runs
 from surfsig.surfaces.report import report_html
 from surfsig.surfaces.table import table_columns, write_csv, write_excel
-from surfsig.surfaces.wording import HEADER, table_rows
+from surfsig.surfaces.wording import HEADER, summary_of, table_rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -114,11 +113,7 @@ class Surfaces:
         """
         if not self.surfaces:
             return f"no surface found: {self._why_none()}"
-        counts = Counter(surface.kind for surface in self.surfaces).most_common()
-        kinds = ", ".join(f"{count} {_plural(kind, count)}" for kind, count in counts)
-        share = float((self.labels >= 0).mean())
-        total = f"{len(self)} {_plural('surface', len(self))}"
-        return f"{total}: {kinds}; {share:.1%} of {len(self.cloud):,} points"
+        return summary_of(self.surfaces, float((self.labels >= 0).mean()), len(self.cloud))
 
     def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Describe the surfaces for people, in sensible digits.
@@ -289,7 +284,3 @@ class Surfaces:
         if finite < _surfsig.FEWEST_SURFACE_POINTS:
             return f"{finite:,} points are too few"
         return f"of {finite:,} points too few lie on any one surface, within the noise around them"
-
-
-def _plural(word: str, count: int) -> str:
-    return word if count == 1 else {"torus": "tori"}.get(word, word + "s")

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
 from surfsig.arguments import MOST_NEIGHBORS, positive_length, progress_callback, thread_count, whole_number
@@ -76,34 +78,94 @@ def find_surfaces(
     """
     scan = PointCloud.of(cloud)
     warn_if_surface_is_lost(scan)
+    asked = asked_surfaces(min_points, noise, kinds)
     threads = thread_count(threads)
-    noise = None if noise is None else positive_length(noise, "noise")
-    labels, entries = _surfsig.find_surfaces(
-        scan.offsets,
-        origin=scan.origin.tolist(),
-        kinds=_kinds(kinds),
-        min_points=None if min_points is None else whole_number(min_points, "min_points", MOST_NEIGHBORS),
-        noise=noise,
-        threads=threads,
-        progress=progress_callback(progress),
-    )
-    members = members_of(labels, len(entries))
-    found = [
-        measured_surface(
-            {**entry, "checked": True}, scan.offsets[chosen].astype(np.float64), scan.origin, chosen
+    return found_in(scan, asked, threads, progress_callback(progress)).surfaces(scan, asked, threads)
+
+
+@dataclass(frozen=True)
+class AskedSurfaces:
+    """Which surfaces are looked for, as `find_surfaces` says."""
+
+    min_points: int | None
+    noise: float | None
+    kinds: tuple[Kind, ...]
+
+
+def asked_surfaces(
+    min_points: int | None, noise: float | None, kinds: Sequence[Kind] | None
+) -> AskedSurfaces:
+    """Check what is asked for.
+
+    Raises
+    ------
+    InvalidInputError
+        If it has no meaning.
+    """
+    fewest = None if min_points is None else whole_number(min_points, "min_points", MOST_NEIGHBORS)
+    return AskedSurfaces(fewest, None if noise is None else positive_length(noise, "noise"), _kinds(kinds))
+
+
+@dataclass(frozen=True, eq=False)
+class CoreSurfaces:
+    """What the core found.
+
+    Attributes
+    ----------
+    labels
+        (n,), the number of each point's surface; -1 for none.
+    entries
+        The surfaces, as `measured_surface` takes them.
+    measured
+        (n,), whether each point is one that its surface was fitted to.
+    rounding
+        Distances below it tell nothing.
+    """
+
+    labels: NDArray[np.int32]
+    entries: list[dict[str, Any]]
+    measured: NDArray[np.bool_]
+    rounding: float
+
+    def surfaces(self, scan: PointCloud, asked: AskedSurfaces, threads: int | None) -> Surfaces:
+        """Measure how much of each surface the points cover."""
+        members = members_of(self.labels, len(self.entries))
+        found = [
+            measured_surface(
+                {**entry, "checked": True}, scan.offsets[chosen].astype(np.float64), scan.origin, chosen
+            )
+            for entry, chosen in zip(self.entries, members, strict=True)
+        ]
+        return Surfaces(scan, self.labels, found, asked.noise, threads)
+
+
+def found_in(
+    scan: PointCloud,
+    asked: AskedSurfaces,
+    threads: int | None,
+    progress: Callable[[int, int], object] | None = None,
+) -> CoreSurfaces:
+    """Find the surfaces of a scan."""
+    return CoreSurfaces(
+        *_surfsig.find_surfaces(
+            scan.offsets,
+            origin=scan.origin.tolist(),
+            kinds=asked.kinds,
+            min_points=asked.min_points,
+            noise=asked.noise,
+            threads=threads,
+            progress=progress,
         )
-        for entry, chosen in zip(entries, members, strict=True)
-    ]
-    return Surfaces(scan, labels, found, noise, threads)
+    )
 
 
-def _kinds(kinds: Sequence[Kind] | None) -> list[str]:
+def _kinds(kinds: Sequence[Kind] | None) -> tuple[Kind, ...]:
     if kinds is None:
-        return list(KINDS)
-    chosen: list[str] = [kinds] if isinstance(kinds, str) else list(kinds)
+        return KINDS
+    chosen: list[Kind] = [kinds] if isinstance(kinds, str) else list(kinds)  # type: ignore[list-item]
     wrong = next((kind for kind in chosen if kind not in KINDS), None)
     if wrong is not None:
         raise InvalidInputError(f"kinds must be of {', '.join(KINDS)}, not {wrong!r:.40}")
     if not chosen:
         raise InvalidInputError(f"kinds must be some of {', '.join(KINDS)}")
-    return chosen
+    return tuple(chosen)

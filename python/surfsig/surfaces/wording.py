@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from surfsig.digits import decimals_of, with_error
 from surfsig.shapes.surface import Surface
@@ -13,6 +13,18 @@ from surfsig.surfaces.pipe_runs import PipeRun
 HEADER = ("", "kind", "radius", "95 % interval", "size", "area", "points", "rms")
 
 _JOINTS = {"elbow": "elbows", "corner": "corners", "straight": "straight joints"}
+
+
+def summary_of(surfaces: Sequence[Surface], share: float, points: int) -> str:
+    """Say how many surfaces of each kind there are, and which share of how many points they have."""
+    counts = Counter(surface.kind for surface in surfaces).most_common()
+    kinds = ", ".join(f"{count} {_plural(kind, count)}" for kind, count in counts)
+    total = f"{len(surfaces)} {_plural('surface', len(surfaces))}"
+    return f"{total}: {kinds}; {share:.1%} of {points:,} points"
+
+
+def _plural(word: str, count: int) -> str:
+    return word if count == 1 else {"torus": "tori"}.get(word, word + "s")
 
 
 def table_rows(surfaces: Iterable[Surface]) -> list[tuple[str, ...]]:

@@ -7,16 +7,23 @@ or to Dask; `dataset` reads what came of them.
 """
 
 from surfsig.tiles.dataset import FileDataset, TileDataset, TilePart, open
-from surfsig.tiles.extraction import TileProgress, TilesFailedError, extract_tiles
+from surfsig.tiles.extraction import extract_tiles
+from surfsig.tiles.job import TileProgress, TilesFailedError
 from surfsig.tiles.mapping import map_tiles
+from surfsig.tiles.surface_parts import TileSurface
+from surfsig.tiles.surface_result import TileSurfaces
+from surfsig.tiles.surfaces import find_surfaces_tiles
 
 __all__ = [
     "FileDataset",
     "TileDataset",
     "TilePart",
     "TileProgress",
+    "TileSurface",
+    "TileSurfaces",
     "TilesFailedError",
     "extract_tiles",
+    "find_surfaces_tiles",
     "map_tiles",
     "open",
 ]

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.errors import FileFormatError
+from surfsig.files.atomic import naming
 from surfsig.progress import ProgressCallback
 from surfsig.tiles.lock import locked
+from surfsig.tiles.memory import release_memory
 from surfsig.tiles.plan import Plan, planned
 from surfsig.tiles.rows import Layout
 from surfsig.tiles.sampling import Sampling
@@ -113,6 +115,7 @@ def _made(
         removed(folder)
         survey = surveyed(source, reading, unreadable, share)
         plan = cut(survey)
+        release_memory()
         try:
             store = _binned(survey, source, folder, plan, binning)
         except LostFileError as lost:
@@ -156,7 +159,8 @@ def _binned(
         counts += sizes
         ends = np.cumsum(sizes)
         for tile in np.flatnonzero(sizes):
-            bins.add(int(tile), layout, rows[order[ends[tile] - sizes[tile] : ends[tile]]])
+            # NumPy's `take` copies whole rows: indexing them by an array takes ten times as long.
+            bins.add(int(tile), layout, rows.take(order[ends[tile] - sizes[tile] : ends[tile]]))
     if number != survey.count:
         raise FileFormatError(f"{survey.files[0].parent}: the input files changed while they were read")
     bins.flush()
@@ -167,6 +171,7 @@ def _binned(
     for bin_number in range(len(plan)):
         for layout, kind in enumerate(layouts):
             _sort(rows_path(folder, bin_number, layout), kind, origins)
+            release_memory()
     return Store(
         folder,
         plan,
@@ -196,10 +201,12 @@ class _Bins:
 
     def flush(self) -> None:
         for (tile, layout), parts in sorted(self._waiting.items()):
-            with rows_path(self._folder, tile, layout).open("ab") as file:
+            path = rows_path(self._folder, tile, layout)
+            with naming(path), path.open("ab") as file:
                 for rows in parts:
                     file.write(rows.data)
         self._waiting, self._bytes = {}, 0
+        release_memory()
 
 
 def _sort(path: Path, layout: Layout, origins: NDArray[np.float64]) -> None:
@@ -210,9 +217,9 @@ def _sort(path: Path, layout: Layout, origins: NDArray[np.float64]) -> None:
     rows = rows_from(path, dtype, 0, path.stat().st_size // dtype.itemsize)
     columns = np.ascontiguousarray(coordinates(rows, origins).T)
     starts, lowest, highest = [0], [], []
-    with path.open("r+b") as file:
+    with naming(path), path.open("r+b") as file:
         for block in _blocks(columns):
-            file.write(rows[block].data)
+            file.write(rows.take(block).data)
             starts.append(starts[-1] + len(block))
             low, high = zip(*(_limits(column[block]) for column in columns), strict=True)
             lowest.append(low)

@@ -12,6 +12,9 @@ SAMPLED = 1 << 16
 """Points of a block that are looked at, at least, where it has as many: the others are taken to be where
 these are, which moves a cut by less than a hundredth of a tile."""
 
+_MOST_WAITING = 4 * MOST_CELLS
+"""Cells of others that wait until they are added up at once: of each file there may be many."""
+
 _CELLS_OF_FIRST = 1024
 """Cells along the longest side of the first points: cells only become larger."""
 
@@ -29,16 +32,14 @@ class CellCounts:
     ----------
     exponent
         Cells are 2 ** exponent wide; None before there were two different places.
-    keys
-        (m, 3) int64, the occupied cells.
-    counts
-        (m,) int64.
     """
 
     def __init__(self) -> None:
         self.exponent: int | None = None
-        self.keys = np.empty((0, 3), np.int64)
-        self.counts = np.empty(0, np.int64)
+        self._keys = np.empty((0, 3), np.int64)
+        self._counts = np.empty(0, np.int64)
+        # Exponents, keys and counts of others.
+        self._waiting: list[tuple[int, NDArray[np.int64], NDArray[np.int64]]] = []
         # Points that came while all were in one place.
         self._place = np.zeros(3)
         self._there = 0
@@ -74,15 +75,15 @@ class CellCounts:
         assert self.exponent is not None
         scaled = np.floor(np.ldexp(np.asarray(points, np.float64), -self.exponent))
         keys = np.clip(scaled, -_FARTHEST, _FARTHEST).astype(np.int64)
-        self.keys, self.counts = _summed(
-            np.concatenate([self.keys, keys]), np.concatenate([self.counts, counts])
+        self._keys, self._counts = _summed(
+            np.concatenate([self._keys, keys]), np.concatenate([self._counts, counts])
         )
         self._double()
 
     def _double(self) -> None:
-        while self.exponent is not None and len(self.counts) > MOST_CELLS:
+        while self.exponent is not None and len(self._counts) > MOST_CELLS:
             self.exponent += 1
-            self.keys, self.counts = _summed(self.keys >> 1, self.counts)
+            self._keys, self._counts = _summed(self._keys >> 1, self._counts)
 
     def merge(self, other: CellCounts) -> None:
         """Take over the counts of others."""
@@ -94,18 +95,45 @@ class CellCounts:
             self.exponent = other.exponent
             if self._there:
                 self._count(self._place[None], np.array([self._there]))
-        # Smaller cells lie in larger ones; the larger of both are those of the sum.
-        finer, coarser = other.exponent, max(self.exponent, other.exponent)
-        self.keys, self.exponent = self.keys >> (coarser - self.exponent), coarser
-        self.keys, self.counts = _summed(
-            np.concatenate([self.keys, other.keys >> (coarser - finer)]),
-            np.concatenate([self.counts, other.counts]),
+        self._waiting.append((other.exponent, other.keys, other.counts))
+        if sum(len(counts) for _, _, counts in self._waiting) > _MOST_WAITING:
+            self._add_waiting()
+
+    def _add_waiting(self) -> None:
+        if not self._waiting:
+            return
+        assert self.exponent is not None
+        parts = [(self.exponent, self._keys, self._counts), *self._waiting]
+        self._waiting = []
+        # Smaller cells lie in larger ones; the largest of all are those of the sum.
+        self.exponent = max(exponent for exponent, _, _ in parts)
+        self._keys, self._counts = _summed(
+            np.concatenate([keys >> (self.exponent - exponent) for exponent, keys, _ in parts]),
+            np.concatenate([counts for _, _, counts in parts]),
         )
         self._double()
 
+    def scale(self, factor: float) -> None:
+        """Let each point count so many times."""
+        self._add_waiting()
+        self._counts = np.rint(self._counts * factor).astype(np.int64)
+
+    @property
+    def keys(self) -> NDArray[np.int64]:
+        """The occupied cells (m, 3)."""
+        self._add_waiting()
+        return self._keys
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Points of each, (m,)."""
+        self._add_waiting()
+        return self._counts
+
     def places(self) -> NDArray[np.float64]:
         """Give the middle of each cell, (m, 3)."""
-        middles: NDArray[np.float64] = np.ldexp(self.keys + 0.5, self.exponent or 0)
+        keys = self.keys
+        middles: NDArray[np.float64] = np.ldexp(keys + 0.5, self.exponent or 0)
         return middles
 
     @property

@@ -17,10 +17,10 @@ from surfsig.convert.libraries import library
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.joined import joined
 from surfsig.files.options import box_array
-from surfsig.files.paths import Paths
+from surfsig.files.paths import MANIFEST, Paths
 from surfsig.files.read_file import ReadOptions, read_file
 from surfsig.point_cloud import PointCloud
-from surfsig.tiles.manifest import MANIFEST, read_manifest
+from surfsig.tiles.manifest import read_manifest
 from surfsig.tiles.source import Source
 
 if TYPE_CHECKING:

@@ -6,6 +6,8 @@ any manner goes on with the tiles that have no record, and ``manifest.json`` can
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -13,8 +15,10 @@ from typing import Any
 
 from surfsig.errors import InvalidInputError
 from surfsig.files.atomic import replacing
+from surfsig.files.paths import MANIFEST
 
-MANIFEST, RECORDS, STORE = "manifest.json", "records", "store"
+RECORDS, STORE, PIECES = "records", "store", "pieces"
+TABLES = ("surfaces.json", "surfaces.csv", "surfaces.parquet")
 VERSION = 1
 
 Record = dict[str, Any]
@@ -82,7 +86,7 @@ def check_output(
         )
 
 
-_OWN = {STORE, RECORDS, ".lock"}
+_OWN = {STORE, RECORDS, PIECES, ".lock"}
 
 
 def _shown(value: Any) -> str:
@@ -155,4 +159,37 @@ def cleared(out: Path) -> None:
     for name in names:
         # A name from a manifest is that of a file in this very folder.
         (out / Path(name).name).unlink(missing_ok=True)
-    (out / MANIFEST).unlink(missing_ok=True)
+    remove_pieces(out)
+    for name in (*TABLES, MANIFEST):
+        (out / name).unlink(missing_ok=True)
+
+
+def remove_records(out: Path) -> None:
+    """Remove the records of all parts, which must be written again."""
+    for file in (out / RECORDS).glob("*.json"):
+        file.unlink()
+
+
+def is_new(out: Path, name: str, values: Any) -> bool:
+    """Tell whether pieces are being made into something else than a run before made of them, and note it."""
+    path = out / PIECES / f"{name}.sha256"
+    digest = hashlib.sha256(json.dumps(values).encode()).hexdigest()
+    try:
+        if path.read_text() == digest:
+            return False
+    except FileNotFoundError:
+        pass
+    with replacing(path) as file:
+        file.write(digest.encode())
+    return True
+
+
+def remove_pieces(out: Path, *stages: str) -> None:
+    """Remove what some stages, or all, have found of tiles; nothing else."""
+    folder = out / PIECES
+    patterns = [f"{stage}_*.npz" for stage in stages] or ["*.npz", "*.sha256", ".*.tmp"]
+    for pattern in patterns:
+        for file in folder.glob(pattern):
+            file.unlink(missing_ok=True)
+    with contextlib.suppress(OSError):
+        folder.rmdir()

@@ -17,6 +17,7 @@ from surfsig.errors import InvalidInputError
 from surfsig.files.paths import Paths
 from surfsig.point_cloud import PointCloud
 from surfsig.tiles.binning import cut_by_count, store_of
+from surfsig.tiles.job import MOST_TILES
 from surfsig.tiles.memory import memory_bytes, points_per_tile
 from surfsig.tiles.run import connected, run_here, run_on_cluster
 from surfsig.tiles.source import Source
@@ -69,7 +70,7 @@ def map_tiles(
     """
     if not (np.isfinite(halo) and halo >= 0):
         raise InvalidInputError(f"halo must be a finite number, 0 or more, not {halo!r:.40}")
-    wanted = None if tiles is None else whole_number(tiles, "tiles", 1 << 24)
+    wanted = None if tiles is None else whole_number(tiles, "tiles", MOST_TILES)
     budget = memory_bytes(memory)
     folder = Path(store).absolute()
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import os
 import re
+import sys
 from pathlib import Path
 
 from surfsig.errors import InvalidInputError
@@ -15,13 +18,23 @@ LARGE_SHARE = 0.25
 """Share of the machine's memory beyond which an input is worked on in tiles: files may be compressed, and an
 extraction needs more than the cloud."""
 
-BASE_BYTES = 330 << 20
-"""What a process needs beside its tile: Python, the libraries, blocks of LAZ that are decoded and written. An
-estimate; with it, and the next one, benchmarks/scale.py stayed below what it was given."""
+BASE_BYTES = 240_000_000
+"""What a process needs beside its tile: Python, the libraries, blocks of LAZ that are decoded and written.
+scripts/measure_tile_memory.py measured 162 MB; up to 75 more were seen with 64 files and twelve tiles one
+after the other."""
 
-POINT_BYTES = 260
+LEAST_BYTES = 600_000_000
+"""Memory below which nothing is begun: while files are binned, blocks of half a million points and rows that
+wait for their tiles' files take up to 510 MB, whatever the tiles are."""
+
+POINT_BYTES = 200
 """What a point of a tile needs beside twice its row: the index, the columns of the extraction, and what the
-writer holds; an estimate, too."""
+writer holds. scripts/measure_tile_memory.py measured 104 to 110 with one tile, robust or not; of two with 2.5
+million points each, one after the other, the peak was 875 MB, which asks for 190."""
+
+SURFACE_POINT_BYTES = 300
+"""The same where surfaces are found: neighbours, normals, labels. The script measured 244, with half
+a million and with a million points."""
 
 WHOLE_BYTES = 190
 """What a point needs, its extraction and its file included, where all points are in memory at once."""
@@ -56,13 +69,12 @@ def memory_bytes(memory: int | float | str | None) -> int:
         size = float(memory)
     if not 0 < size < 2**60:
         raise InvalidInputError(f"memory must be a size such as '4GB', not {memory!r:.40}")
-    least = BASE_BYTES + FEWEST_POINTS * 2 * POINT_BYTES
-    if size < least:
-        raise InvalidInputError(f"memory must be at least {least >> 20} MiB, not {memory!r:.40}")
+    if size < LEAST_BYTES:
+        raise InvalidInputError(f"memory must be at least {LEAST_BYTES // 1_000_000} MB, not {memory!r:.40}")
     return int(size)
 
 
-def points_per_tile(memory: int, row_bytes: int) -> int:
+def points_per_tile(memory: int, row_bytes: int, point_bytes: int = POINT_BYTES) -> int:
     """Give the points of a tile that one process with so many bytes can work on.
 
     Parameters
@@ -71,9 +83,11 @@ def points_per_tile(memory: int, row_bytes: int) -> int:
         Of the process.
     row_bytes
         Of a row in the store.
+    point_bytes
+        What a point needs beside its rows.
     """
     room = memory - BASE_BYTES
-    return int(min(max(room / (POINT_BYTES + 2 * row_bytes), FEWEST_POINTS), MOST_POINTS))
+    return int(min(max(room / (point_bytes + 2 * row_bytes), FEWEST_POINTS), MOST_POINTS))
 
 
 def total_bytes() -> int:
@@ -104,6 +118,18 @@ def resident_bytes() -> int:
     except (OSError, ValueError, IndexError):
         return 0
     return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+def release_memory() -> None:
+    """Give memory that is free within this process back to the system, where its C library can (glibc).
+
+    Arrays of tiles come and go in several sizes; what lies between them would be kept, and add up from tile
+    to tile.
+    """
+    if sys.platform != "linux":
+        return
+    with contextlib.suppress(AttributeError, OSError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _limit_of_group() -> int | None:

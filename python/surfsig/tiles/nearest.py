@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfsig import _surfsig
 
+if TYPE_CHECKING:
+    from surfsig.tiles.task import TileSource
+
 _DOUBLINGS = 60
+
+
+def distances_in(source: TileSource, k: int) -> tuple[float, ...]:
+    """Give the distance to the k-th nearest point from each of some places of a source, ascending."""
+    facts = source.facts
+
+    def points_in(box: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(source.read_box(box).points, np.float64)
+
+    volume = np.prod(np.sort(np.ptp(facts.bounds, axis=0))[1:]) if facts.finite else 0.0
+    first = math.sqrt(max(float(volume), 0.0) * k / max(facts.finite, 1)) or 1.0
+    return tuple(distances_to_nearest(facts.places, k, first, points_in, facts.bounds))
 
 
 def distances_to_nearest(

@@ -84,9 +84,11 @@ def planned(counts: CellCounts, most_points: int, tiles: int | None = None) -> P
     """
     wanted = max(-(-counts.total // max(most_points, 1)), tiles or 1, 1)
     numbers = iter(range(wanted))
+    # These settle the exponent.
+    keys, points = counts.keys, counts.counts
     if counts.exponent is None:
         return Plan(0)
-    return Plan(_cut(counts.keys, counts.counts, counts.exponent, int(wanted), numbers))
+    return Plan(_cut(keys, points, counts.exponent, int(wanted), numbers))
 
 
 def _cut(keys: NDArray[np.int64], counts: NDArray[np.int64], exponent: int, tiles: int, numbers: Any) -> Node:

@@ -13,6 +13,9 @@ from surfsig.coordinate_system import CoordinateSystem
 from surfsig.files.blocks import Finish
 from surfsig.point_cloud import PointCloud
 
+_ROWS_AT_ONCE = 4096
+"""Rows whose columns are filled one after the other: they stay in the cache of a core, some 300 KB."""
+
 
 @dataclass(frozen=True)
 class Layout:
@@ -46,9 +49,12 @@ class Layout:
     def rows(self, cloud: PointCloud, numbers: NDArray[np.uint64], file: int) -> NDArray[Any]:
         """Put points side by side."""
         rows = np.empty(len(cloud), self.dtype)
-        rows["number"], rows["file"], rows["offsets"] = numbers, file, cloud.offsets
-        for i, (name, _, _) in enumerate(self.fields):
-            rows[f"{i}"] = cloud.fields[name]
+        for start in range(0, len(rows), _ROWS_AT_ONCE):
+            part = slice(start, start + _ROWS_AT_ONCE)
+            some = rows[part]
+            some["number"], some["file"], some["offsets"] = numbers[part], file, cloud.offsets[part]
+            for i, (name, _, _) in enumerate(self.fields):
+                some[f"{i}"] = cloud.fields[name][part]
         return rows
 
     def columns(self, rows: NDArray[Any]) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from surfsig.convert.libraries import library
+from surfsig.tiles.memory import release_memory
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -65,7 +66,9 @@ def run_here(
 ) -> Generator[tuple[int, Result], None, None]:
     """Run a task on tiles in this thread, one after the other; give each tile with its result."""
     for tile in tiles:
-        yield tile, task(tile)
+        result = task(tile)
+        release_memory()
+        yield tile, result
 
 
 def run_on_cluster(
@@ -127,7 +130,9 @@ class _OnWorker(Generic[Result]):
             threads = 1
         with _ONE_AT_A_TIME, warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return self._task(tile, threads)
+            result = self._task(tile, threads)
+            release_memory()
+            return result
 
 
 def _one_line(error: BaseException) -> str:

@@ -137,7 +137,7 @@ class Store:
             points = self.coordinates(rows)
             with np.errstate(invalid="ignore"):
                 inside = ((points >= box[0]) & (points <= box[1])).all(axis=1)
-            found.append(rows[inside])
+            found.append(rows.take(np.flatnonzero(inside)))
         return found
 
     def coordinates(self, rows: NDArray[Any]) -> NDArray[np.float64]:
@@ -158,7 +158,7 @@ class Store:
             if tile is not None and found:
                 own[: len(found[0])] = True
             order = np.argsort(rows["number"], kind="stable")
-            stacks.append((rows[order], own[order]))
+            stacks.append((rows.take(order), own[order]))
         ends = [
             np.searchsorted(np.ascontiguousarray(rows["file"]), np.arange(len(self.heads) + 1)).tolist()
             for rows, _ in stacks

@@ -156,7 +156,7 @@ def _look_first(
     assert layout is not None
     if opened.count is not None and looked:
         # Of LAZ, whose coordinates are whole numbers and so finite.
-        cells.counts = np.rint(cells.counts * (opened.count / looked)).astype(np.int64)
+        cells.scale(opened.count / looked)
         looked = finite = opened.count
     found.cells.merge(cells)
     found.files.append(file)

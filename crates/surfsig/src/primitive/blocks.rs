@@ -23,7 +23,7 @@ const MOST_CROSSING: f64 = 3.0;
 const SURELY: f64 = 2.0;
 
 /// Points cut into blocks of neighbours, of which only whole ones count as independent.
-pub(super) struct Blocks {
+pub(crate) struct Blocks {
     /// The number of each point's block.
     pub labels: Vec<usize>,
     /// How many times as large a variance is as these blocks tell, by what points on either side of their borders have in

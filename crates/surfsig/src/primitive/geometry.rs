@@ -74,7 +74,7 @@ impl Primitive {
     }
 
     /// The same surface, held next to a place.
-    pub(super) fn beside(&self, place: &Vector) -> Self {
+    pub(crate) fn beside(&self, place: &Vector) -> Self {
         let from = place - self.point;
         let height = from.dot(&self.axis);
         match self.kind {
@@ -89,7 +89,7 @@ impl Primitive {
     }
 
     /// The same surface; its axis has a positive z (else y, else x) where its sign means nothing.
-    pub(super) fn upward(&self) -> Self {
+    pub(crate) fn upward(&self) -> Self {
         let up = self.kind == SurfaceKind::Cone || [self.axis.z, self.axis.y, self.axis.x] > [0.0; 3];
         Self { axis: if up { self.axis } else { -self.axis }, ..*self }
     }

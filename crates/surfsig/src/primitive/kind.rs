@@ -47,7 +47,7 @@ impl SurfaceKind {
     }
 
     /// Which parameter its size is, the radius of most; of a plane or line a shift.
-    pub(super) fn size(self) -> usize {
+    pub(crate) fn size(self) -> usize {
         [0, 3, 4, 4, 6, 5, 0][self as usize]
     }
 

@@ -14,7 +14,7 @@ mod linear;
 mod start;
 mod uncertainty;
 
-pub(crate) use blocks::design_effect;
+pub(crate) use blocks::{Blocks, design_effect};
 pub use conditions::PrimitiveFitOptions;
 pub use geometry::Primitive;
 pub(crate) use geometry::{Chart, Vector, extent};
@@ -22,7 +22,7 @@ pub use kind::SurfaceKind;
 pub(crate) use least_squares::{EXACT, QUICK, Termination, refine};
 pub(crate) use start::{bent, smallest, start};
 pub use uncertainty::PrimitiveUncertainty;
-pub(crate) use uncertainty::{Uncertainty, uncertainty};
+pub(crate) use uncertainty::{BlockEquations, Uncertainty, uncertainty, uncertainty_of_equations};
 
 use candidates::{candidates, distinct, sample};
 use conditions::Conditions;

@@ -69,7 +69,7 @@ fn uncertainty_with(
             sums[label].add(&linear, row, residual);
         }
     });
-    let of_free = linear.uncertainty(&sums, size)?;
+    let of_free = of_blocks(&linear.inverse, &sums, size)?;
     let parameters = primitive.kind.parameters();
     let mut covariance = DMatrix::zeros(parameters, parameters);
     for (i, &row) in free.iter().enumerate() {
@@ -99,38 +99,62 @@ impl BlockSums {
     }
 }
 
-impl Linear {
-    /// The covariance with independent blocks, and the freedom of one parameter's variance.
-    fn uncertainty(&self, blocks: &[BlockSums], parameter: usize) -> Option<Uncertainty> {
-        let parameters = self.parameters;
-        let count = blocks.len();
-        let mut middle = DMatrix::<f64>::zeros(parameters, parameters);
-        let mut gram = DMatrix::<f64>::zeros(count, count);
-        // What the parameter's error is to each block's residuals: q (1 - q^T q)^-1/2 c.
-        let mut errors = DMatrix::<f64>::zeros(parameters, count);
-        for (number, BlockSums { normal, gradient }) in blocks.iter().enumerate() {
-            let normal = DMatrix::from_fn(parameters, parameters, |i, j| normal[i.max(j)][i.min(j)]);
-            let gradient = DVector::from_column_slice(&gradient[..parameters]);
-            let taken = normal.clone().symmetric_eigen();
-            if taken.eigenvalues.max() > ALL {
-                return None;
-            }
-            let scale = taken.eigenvalues.map(|share| 1.0 / (1.0 - share).sqrt());
-            let turn = &taken.eigenvectors;
-            let correction = turn * DMatrix::from_diagonal(&scale) * turn.transpose();
-            let score = &correction * gradient;
-            middle.ger(1.0, &score, &score, 1.0);
-            let weights = correction * self.inverse.row(parameter).transpose();
-            let error = normal * &weights;
-            gram[(number, number)] = weights.dot(&error);
-            errors.set_column(number, &error);
+/// Of the points of a block J^T J and J^T d, with the Jacobian J of their distances d.
+pub(crate) struct BlockEquations {
+    pub normal: DMatrix<f64>,
+    pub gradient: DVector<f64>,
+}
+
+/// From the equations of blocks of neighbours where the sum of all gradients is 0, with the freedom of one parameter's
+/// variance. `None` where all points, or all but those of one block, do not determine the parameters.
+pub(crate) fn uncertainty_of_equations(blocks: &[BlockEquations], parameter: usize) -> Option<Uncertainty> {
+    let normal = blocks.iter().map(|block| &block.normal).sum::<DMatrix<f64>>();
+    // J^T J = R^T R, with the triangle R of the Jacobian.
+    let triangle = normal.cholesky()?.l().transpose();
+    let parameters = triangle.ncols();
+    let inverse = triangle.solve_upper_triangular(&DMatrix::identity(parameters, parameters))?;
+    let of_block = |block: &BlockEquations| {
+        let (normal, gradient) = (inverse.tr_mul(&block.normal) * &inverse, inverse.tr_mul(&block.gradient));
+        let mut sums = BlockSums::default();
+        for i in 0..parameters {
+            sums.gradient[i] = gradient[i];
+            (0..=i).for_each(|j| sums.normal[i][j] = normal[(i, j)]);
         }
-        gram -= errors.tr_mul(&errors);
-        Some(Uncertainty {
-            covariance: &self.inverse * middle * self.inverse.transpose(),
-            freedom: gram.trace().powi(2) / gram.norm_squared(),
-        })
+        sums
+    };
+    of_blocks(&inverse, &blocks.iter().map(of_block).collect::<Vec<_>>(), parameter)
+}
+
+/// The covariance with independent blocks, and the freedom of one parameter's variance.
+fn of_blocks(inverse: &DMatrix<f64>, blocks: &[BlockSums], parameter: usize) -> Option<Uncertainty> {
+    let parameters = inverse.ncols();
+    let count = blocks.len();
+    let mut middle = DMatrix::<f64>::zeros(parameters, parameters);
+    let mut gram = DMatrix::<f64>::zeros(count, count);
+    // What the parameter's error is to each block's residuals: q (1 - q^T q)^-1/2 c.
+    let mut errors = DMatrix::<f64>::zeros(parameters, count);
+    for (number, BlockSums { normal, gradient }) in blocks.iter().enumerate() {
+        let normal = DMatrix::from_fn(parameters, parameters, |i, j| normal[i.max(j)][i.min(j)]);
+        let gradient = DVector::from_column_slice(&gradient[..parameters]);
+        let taken = normal.clone().symmetric_eigen();
+        if taken.eigenvalues.max() > ALL {
+            return None;
+        }
+        let scale = taken.eigenvalues.map(|share| 1.0 / (1.0 - share).sqrt());
+        let turn = &taken.eigenvectors;
+        let correction = turn * DMatrix::from_diagonal(&scale) * turn.transpose();
+        let score = &correction * gradient;
+        middle.ger(1.0, &score, &score, 1.0);
+        let weights = correction * inverse.row(parameter).transpose();
+        let error = normal * &weights;
+        gram[(number, number)] = weights.dot(&error);
+        errors.set_column(number, &error);
     }
+    gram -= errors.tr_mul(&errors);
+    Some(Uncertainty {
+        covariance: inverse * middle * inverse.transpose(),
+        freedom: gram.trace().powi(2) / gram.norm_squared(),
+    })
 }
 
 impl Primitive {
@@ -286,7 +310,7 @@ mod tests {
         let linear = of_rows(3, &rows).unwrap();
         let mut blocks = vec![BlockSums::default(); 40];
         blocks.iter_mut().zip(&rows).for_each(|(block, (row, residual))| block.add(&linear, row, *residual));
-        let found = linear.uncertainty(&blocks, 2).unwrap();
+        let found = of_blocks(&linear.inverse, &blocks, 2).unwrap();
         assert!((&found.covariance - &expected).norm() < 1e-10 * expected.norm());
         // Satterthwaite's: (sum of eigenvalues)^2 / sum of squares, of the quadratic form in the noise.
         let mut weights = DMatrix::identity(40, 40) - hat;

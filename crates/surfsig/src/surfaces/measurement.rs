@@ -40,7 +40,12 @@ const AT_LIMIT: f64 = 0.1;
 const MOST_SHARE: f64 = 0.5;
 
 /// The surfaces of a scene, whose points have their numbers as labels, in the same order.
-pub(super) fn measured(scene: &Scene, kinds: &[SurfaceKind], regions: &[Region]) -> Vec<FoundSurface> {
+/// With each the points that it was fitted to.
+pub(super) fn measured(
+    scene: &Scene,
+    kinds: &[SurfaceKind],
+    regions: &[Region],
+) -> Vec<(FoundSurface, Vec<u32>)> {
     let limits: Vec<Limit> = regions
         .iter()
         .map(|region| Limit { chart: region.primitive.chart(), tolerance: region.tolerance(scene) })
@@ -54,7 +59,9 @@ pub(super) fn measured(scene: &Scene, kinds: &[SurfaceKind], regions: &[Region])
             found = fitted(&mut as_smooth, scene, limits[number].tolerance);
             inner = as_smooth;
         }
-        FoundSurface { count: region.members.len(), ..found }
+        let is_exact = scene.is_noiseless(region.noise);
+        let tolerance = limits[number].tolerance;
+        (FoundSurface { count: region.members.len(), tolerance, is_exact, ..found }, inner.members)
     };
     regions.par_iter().enumerate().map(described).collect()
 }
@@ -144,9 +151,10 @@ fn fitted(region: &mut Region, scene: &Scene, tolerance: f64) -> FoundSurface {
     let chart = region.primitive.chart();
     let distances: Vec<f64> = points.iter().map(|point| chart.distance(point)).collect();
     let freedom = points.len().saturating_sub(kind.parameters()).max(1);
+    let at_limit = distances.iter().filter(|distance| is_at_limit(**distance, tolerance)).count();
     region.deviation = (distances.iter().map(|d| d * d).sum::<f64>() / freedom as f64).sqrt();
     let sure = uncertainty(&region.primitive, &points).map(|sure| Uncertainty {
-        covariance: sure.covariance * variance_factor(&distances, tolerance),
+        covariance: sure.covariance * variance_factor(at_limit, distances.len()),
         ..sure
     });
     described(&region.primitive, region.deviation, scene.origin, sure)
@@ -155,10 +163,14 @@ fn fitted(region: &mut Region, scene: &Scene, tolerance: f64) -> FoundSurface {
 /// By how much a parameter's variance grows because points beyond a limit are not counted: where the surface moves,
 /// points leave on one side and come in on the other, so that the sum of the residuals changes by 1 - 2 T f(T) times the
 /// shift, with their density f at the limit T, instead of by once (the asymptotic variance of a skipped mean).
-fn variance_factor(distances: &[f64], limit: f64) -> f64 {
-    let at_limit = distances.iter().filter(|distance| distance.abs() > (1.0 - AT_LIMIT) * limit).count();
-    let share = at_limit as f64 / distances.len().max(1) as f64 / AT_LIMIT;
+pub(super) fn variance_factor(at_limit: usize, count: usize) -> f64 {
+    let share = at_limit as f64 / count.max(1) as f64 / AT_LIMIT;
     (1.0 - share.min(MOST_SHARE)).powi(-2)
+}
+
+/// Whether a distance is near the limit, as density is counted there.
+pub(super) fn is_at_limit(distance: f64, limit: f64) -> bool {
+    distance.abs() > (1.0 - AT_LIMIT) * limit
 }
 
 /// The simpler kind that a surface is not significantly different from: a sphere or cylinder whose radius is uncertain by
@@ -172,8 +184,13 @@ fn insignificant(found: &FoundSurface) -> Option<SurfaceKind> {
     (size < SIGNIFICANT * error).then_some(simpler)
 }
 
-/// A surface with its errors; its count is not known here.
-fn described(p: &Primitive, deviation: f64, origin: Vector, sure: Option<Uncertainty>) -> FoundSurface {
+/// A surface with its errors; its count, tolerance and noise are not known here.
+pub(super) fn described(
+    p: &Primitive,
+    deviation: f64,
+    origin: Vector,
+    sure: Option<Uncertainty>,
+) -> FoundSurface {
     let parameters = p.kind.parameters();
     // Of a parameter by its place in the covariance, on one kind of surface.
     let std_of = |kind: SurfaceKind, place: usize| match &sure {
@@ -195,6 +212,8 @@ fn described(p: &Primitive, deviation: f64, origin: Vector, sure: Option<Uncerta
         half_angle: p.half_angle(),
         deviation,
         count: 0,
+        tolerance: f64::NAN,
+        is_exact: false,
         radius_std,
         major_radius_std: std_of(SurfaceKind::Torus, 5),
         half_angle_std: std_of(SurfaceKind::Cone, 5),

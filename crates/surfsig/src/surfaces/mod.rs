@@ -3,13 +3,16 @@
 //! [`scene`] knows each point's neighbours, normal and noise ([`surroundings`], [`sheets`]); [`growth`] lets a
 //! [`crate::Primitive`] grow, [`evidence`] says whether it counts, [`merging`] joins what is one and shares out what lies
 //! between; [`unexplained`] looks again among the points that are left, by [`consensus`] at last; [`kinds`] tries what has
-//! grown among noise as other kinds, [`pieces`] joins what does not touch, and [`measurement`] says what each surface
-//! measures.
+//! grown among noise as other kinds, [`pieces`] joins what does not touch, by [`comparison`], and [`measurement`] says
+//! what each surface measures. Where parts of a cloud are looked at one by one, [`joining`] says which pieces are of one
+//! surface, and [`sums`] of the parts measure it.
 
+mod comparison;
 mod consensus;
 mod evidence;
 mod graph;
 mod growth;
+mod joining;
 mod kinds;
 mod likeness;
 mod local_fits;
@@ -19,10 +22,11 @@ mod pieces;
 mod scene;
 mod sheets;
 mod stamps;
+mod sums;
 mod surroundings;
 mod unexplained;
 
-use crate::primitive::SurfaceKind;
+use crate::primitive::{Primitive, SurfaceKind, Vector};
 use crate::{Error, Monitor, PointCloud, with_threads};
 use evidence::Evidence;
 use growth::{Grower, Region};
@@ -30,6 +34,8 @@ use scene::{LOCAL, NONE, Scene};
 use stamps::Stamps;
 
 pub use evidence::FEWEST_SURFACE_POINTS;
+pub use joining::{JoinedPieces, PiecePair, SurfacePiece, join_surface_pieces};
+pub use sums::SurfaceSums;
 
 /// Seeds of which surfaces begin; of larger clouds not every point is one.
 const MOST_SEEDS: usize = 100_000;
@@ -91,6 +97,35 @@ pub struct FoundSurface {
     pub across: [[f64; 3]; 2],
     /// Degrees of freedom behind the covariance, for Student's t.
     pub freedom: f64,
+    /// Distance up to which points are its own.
+    pub tolerance: f64,
+    /// Whether its points have no noise.
+    pub is_exact: bool,
+}
+
+impl FoundSurface {
+    /// The surface without its errors.
+    ///
+    /// ```
+    /// use surfsig::{find_surfaces, Monitor, PointCloud, SurfaceOptions};
+    /// let points: Vec<[f64; 3]> = (0..900).map(|i| [(i % 30) as f64, (i / 30) as f64, 2.0]).collect();
+    /// let found = find_surfaces(&PointCloud::new_f64(&points), &SurfaceOptions::default(), &Monitor::default())?;
+    /// assert!((found.surfaces[0].primitive().distances(&[[5.0, 6.0, 5.0]])[0].abs() - 3.0).abs() < 1e-9);
+    /// # Ok::<(), surfsig::Error>(())
+    /// ```
+    pub fn primitive(&self) -> Primitive {
+        let or_nothing = |size: f64| if size.is_nan() { 0.0 } else { size };
+        let is_sphere = self.kind == SurfaceKind::Sphere;
+        Primitive {
+            kind: self.kind,
+            point: Vector::from(self.point),
+            // A sphere's is never looked at.
+            axis: if is_sphere { Vector::z() } else { Vector::from(self.axis) },
+            radius: or_nothing(self.radius),
+            major_radius: or_nothing(self.major_radius),
+            half_angle: or_nothing(self.half_angle),
+        }
+    }
 }
 
 /// The surfaces of a scan.
@@ -100,6 +135,10 @@ pub struct FoundSurfaces {
     pub labels: Vec<i32>,
     /// The surfaces, the one with most points first.
     pub surfaces: Vec<FoundSurface>,
+    /// Whether each point is one that its surface was fitted to: those at borders are not.
+    pub measured: Vec<bool>,
+    /// Distances below this are rounding.
+    pub rounding: f64,
 }
 
 /// Finds the planes, spheres, cylinders, cones and tori of a scan.
@@ -126,7 +165,12 @@ pub fn find_surfaces(
 ) -> Result<FoundSurfaces, Error> {
     with_threads(options.threads, || {
         let Some(mut scene) = Scene::new(cloud, options.noise, LOCAL, None, monitor)? else {
-            return Ok(FoundSurfaces { labels: vec![NONE; cloud.len()], surfaces: Vec::new() });
+            return Ok(FoundSurfaces {
+                labels: vec![NONE; cloud.len()],
+                surfaces: Vec::new(),
+                measured: vec![false; cloud.len()],
+                rounding: 0.0,
+            });
         };
         let evidence = Evidence::new(options.fewest, &scene);
         // The simplest first, in whatever order they were asked for.
@@ -236,5 +280,11 @@ fn assembled(
     for (&number, &label) in scene.numbers.iter().zip(&scene.labels) {
         labels[number as usize] = label;
     }
-    FoundSurfaces { labels, surfaces: measurement::measured(&scene, kinds, &regions) }
+    let mut measured = vec![false; points];
+    let mut surfaces = Vec::with_capacity(regions.len());
+    for (surface, inner) in measurement::measured(&scene, kinds, &regions) {
+        inner.iter().for_each(|&point| measured[scene.numbers[point as usize] as usize] = true);
+        surfaces.push(surface);
+    }
+    FoundSurfaces { labels, surfaces, measured, rounding: scene.floor }
 }
