@@ -65,6 +65,8 @@ settings_class! {
         rival_distance: f64 = rivals.distance,
         /// Radii of a patch by which the source is pushed along motions that are weakly held.
         rival_push: f64 = rivals.push,
+        /// Part of such a push that alone must leave the source on the surface.
+        rival_nudge: f64 = rivals.nudge,
         /// Distances from the surface over the points' paths, below which a motion is weakly held.
         rival_weak: f64 = rivals.weak,
         /// What a rival explains less, as a share, at least, to be refuted.

@@ -22,7 +22,7 @@ from .places import block, corridor, forest, hall, pipes, plane, room, tunnel, u
 from .poses import UP, facing, pose, turn
 from .scanner import Scanner
 from .scene import Hits, Placed, Scene
-from .sensors import DepthCamera, Lidar, distorted, scan
+from .sensors import Calibration, DepthCamera, Lidar, bent_calibration, distorted, scan
 from .surfaces import Box, Cone, Cylinder, Plane, Rectangle, Sphere, Surface
 
 __all__ = [
@@ -31,6 +31,7 @@ __all__ = [
     "UP",
     "Acquisition",
     "Box",
+    "Calibration",
     "Cone",
     "Cylinder",
     "DepthCamera",
@@ -46,6 +47,7 @@ __all__ = [
     "Scene",
     "Sphere",
     "Surface",
+    "bent_calibration",
     "block",
     "corridor",
     "distorted",

@@ -3,7 +3,10 @@
 use super::doubt::Doubt;
 use super::free_space::BothSensors;
 use super::settings::RegistrationSettings;
-use crate::alignment::{Alternative, Explained, FreeDirection, PointToSurface, Rivals, TargetSurface};
+use crate::alignment::{
+    Alternative, Explained, FittedSurface, FittedTarget, FreeDirection, PointToSurface, Rivals, TargetSurface,
+    symmetries,
+};
 use crate::geometry::RigidTransform;
 use crate::random::some_of;
 
@@ -44,17 +47,27 @@ impl Judge<'_> {
         let numbers = some_of(self.sample.len(), settings.rivals.points);
         let some: Vec<[f64; 3]> = numbers.into_iter().map(|i| self.sample[i]).collect();
         let rivals = Rivals {
-            surface: self.surface,
+            surface: FittedTarget {
+                surface: self.surface,
+                farthest: found.farthest,
+                fit: settings.rival_fit,
+            },
             source: &some,
-            best: found,
+            T_target_source: found.T_target_source,
             radius: self.radius,
             settings: settings.rivals,
-            fit: settings.rival_fit,
         };
         let best = rivals.explained();
         let free_space = self.sensors.free_space(&found.T_target_source);
+        let moved = found.T_target_source.transform_points(&some);
+        let symmetric = symmetries(self.surface.points(), &found.normals, &moved, self.radius);
+        let proposed: Vec<RigidTransform> = proposed
+            .iter()
+            .copied()
+            .chain(symmetric.into_iter().map(|symmetry| symmetry * found.T_target_source))
+            .collect();
         let alternatives: Vec<Alternative> = rivals
-            .as_good_as_the_best(&best, proposed)
+            .as_good_as_the_best(&best, &proposed)
             .into_iter()
             .map(|(transform, explained)| Alternative {
                 T_target_source: transform,
@@ -74,14 +87,14 @@ impl Judge<'_> {
         let mut judged = Judgement {
             better: alternatives.iter().find(is_better).map(|rival| rival.T_target_source),
             doubts: Vec::new(),
-            free_directions: rivals.free_directions(&best),
+            free_directions: rivals.free_directions(&best, &found.points, &found.normals),
             alternatives,
             explained: best.share(),
             free_space,
             scale: f64::NAN,
             scale_standard_error: f64::NAN,
         };
-        self.scale(&rivals, &best, &mut judged);
+        self.scale(&moved, &rivals.surface, &best, &mut judged);
         self.doubt(found, inliers, &mut judged);
         judged
     }
@@ -115,14 +128,19 @@ impl Judge<'_> {
     }
 
     /// Whether a source of another size fits better.
-    fn scale(&self, rivals: &Rivals<'_>, best: &Explained, judged: &mut Judgement) {
-        let moved = rivals.best.T_target_source.transform_points(rivals.source);
-        let Some(found) = self.surface.scale_of(&moved, &self.settings.rival_fit) else { return };
+    fn scale(
+        &self,
+        moved: &[[f64; 3]],
+        surface: &FittedTarget<'_>,
+        best: &Explained,
+        judged: &mut Judgement,
+    ) {
+        let Some(found) = self.surface.scale_of(moved, &self.settings.rival_fit) else { return };
         judged.scale = found.scale;
         judged.scale_standard_error = found.standard_error;
         let off = found.scale.ln().abs();
         let is_significant = off > self.settings.scale_deviations * found.standard_error / found.scale;
-        let deficit = best.deficit_of(&rivals.closeness_of(&found.points));
+        let deficit = best.deficit_of(&surface.closeness(&found.points));
         if is_significant
             && off > self.settings.doubted_scale
             && deficit.is_some_and(|(deficit, _)| deficit < 0.0)
