@@ -28,7 +28,7 @@ def edge(poses: np.ndarray, source: int, target: int, seed: int, noise: float = 
     about = geometry.from_translation(center)
     twist = noise * rng.normal(0.0, NOISE)
     measured = about @ geometry.exp_twist(-twist) @ geometry.inverse(about) @ exact
-    return Edge(source, target, measured, np.diag(NOISE**2), center, 1.0)
+    return Edge(source, target, measured, np.diag(NOISE**-2.0), center, 1.0)
 
 
 PAIRS = [(1, 0), (2, 1), (3, 2), (4, 3), (0, 4), (2, 0), (3, 1)]
@@ -59,7 +59,7 @@ def test_one_wrong_pair_hardly_moves_the_others() -> None:
     wrong = edge(poses, 3, 0, 6)
     shifted = wrong.T_target_source.copy()
     shifted[:3, 3] += 8.0
-    lighter = Edge(3, 0, shifted, wrong.covariance, wrong.center, 0.1)
+    lighter = Edge(3, 0, shifted, wrong.information, wrong.center, 0.1)
     found = solve(5, 0, [*edges, lighter])
     assert np.linalg.norm(found.T_world_scan[:, :3, 3] - poses[:, :3, 3], axis=1).max() < 0.5
     assert found.residuals[-1] > 20.0 * found.residuals[:-1].max()

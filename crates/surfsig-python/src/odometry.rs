@@ -116,7 +116,8 @@ impl Odometry {
         arrays.set_item("covariances", covariances.into_pyarray(py).reshape([found.len(), 6, 6])?)?;
         arrays.set_item("status", status.into_pyarray(py))?;
         arrays.set_item("overlaps", overlaps.into_pyarray(py))?;
-        let free: Vec<_> = found.iter().map(|pose| free_directions_to_python(&pose.free_directions)).collect();
+        let free: Vec<_> =
+            found.iter().map(|pose| free_directions_to_python(&pose.free_directions)).collect();
         arrays.set_item("free_directions", free)?;
         Ok(arrays)
     }

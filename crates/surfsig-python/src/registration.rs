@@ -138,6 +138,7 @@ pub fn register<'py>(
     result.set_item("T_target_source", matrix)?;
     result.set_item("covariance", found.covariance.as_flattened().to_pyarray(py).reshape([6, 6])?)?;
     result.set_item("center", found.center.to_pyarray(py))?;
+    result.set_item("information", found.information.as_flattened().to_pyarray(py).reshape([6, 6])?)?;
     result.set_item("free_directions", free_directions_to_python(&found.free_directions))?;
     result.set_item("matches", found.matches)?;
     result.set_item("inliers", found.inliers)?;

@@ -49,15 +49,35 @@ class Instance:
     """Root mean square of the distances there, in the clouds' unit."""
     free_directions: list[FreeDirection]
     """Motions, in the scene's coordinates, in which what is seen does not hold the model."""
+    alternatives: list[Array]
+    """Other poses T_scene_model, (4, 4) each, that explain as much of what is seen, as of a box that looks the
+    same after half a turn."""
+    scale: float
+    """How many times as large as the model the instance is, by a similarity transform; NaN where what is seen
+    does not determine it. The pose itself is rigid."""
+    scale_standard_error: float
+    """Of `scale`."""
+    doubts: list[str]
+    """Names of the tests that the pose has not survived: free_directions, ambiguous, scale; empty where it is
+    trusted."""
+    reasons: list[str]
+    """The same in words."""
     indices: NDArray[np.int64]
     """Numbers of the scene's points that are the instance's, ascending."""
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the pose was tried to be refuted and was not: it is the only one that explains as much, all
+        of it is determined, and the instance is as large as the model."""
+        return not self.doubts
 
     def __repr__(self) -> str:
         """Say what it is."""
         free = "".join(f", {direction}" for direction in self.free_directions)
+        why = "".join(f"; {reason}" for reason in self.reasons)
         return (
             f"Instance({self.name}: score {self.score:.2f}, {self.visible:.0%} visible, "
-            f"{len(self.indices)} points, rms {self.rms:.3g}{free})"
+            f"{len(self.indices)} points, rms {self.rms:.3g}{free}{why})"
         )
 
     def values(self) -> dict[str, Any]:
@@ -77,6 +97,11 @@ class Instance:
             "overlap": self.overlap,
             "rms": self.rms,
             "free_directions": [free.values() for free in self.free_directions],
+            "alternatives": [pose.tolist() for pose in self.alternatives],
+            "scale": self.scale if np.isfinite(self.scale) else None,
+            "scale_standard_error": self.scale_standard_error if np.isfinite(self.scale) else None,
+            "trusted": self.trusted,
+            "reasons": self.reasons,
             "points": len(self.indices),
         }
 

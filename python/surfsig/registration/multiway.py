@@ -261,7 +261,7 @@ class _Graph:
     def _edge(self, number: int) -> Edge:
         source, target, result = self.found[number]
         return Edge(
-            source, target, result.T_target_source, result.covariance, result.center, result.explained
+            source, target, result.T_target_source, result.information, result.center, result.explained
         )
 
     def _reference(self, used: set[int]) -> int:

@@ -14,8 +14,6 @@ from surfsig import geometry
 
 Array = NDArray[np.float64]
 
-_UNDETERMINED = 1e-9
-"""Of the largest eigenvalue of an information matrix, below which a direction says nothing."""
 _ROBUST = 3.0
 """Standard deviations beyond which a residual counts less than its square (`soft_l1`)."""
 
@@ -28,19 +26,20 @@ class Edge:
     target: int
     T_target_source: Array
     """(4, 4)."""
-    covariance: Array
-    """(6, 6), of the twist about `center` in the target's axes, rotation first."""
+    information: Array
+    """(6, 6), the inverse of the covariance of the twist about `center` in the target's axes, rotation first; 0
+    along motions that are not determined."""
     center: Array
     """(3,), in the target's coordinates."""
     weight: float
     """How much speaks for it; the tree that poses begin with takes the heaviest edges."""
 
     def square_root_information(self) -> Array:
-        """Give W with W^T W the inverse of the covariance, in the directions that are determined."""
-        scale = np.sqrt(np.maximum(np.diag(self.covariance), np.finfo(float).tiny))
-        values, vectors = np.linalg.eigh(self.covariance / np.outer(scale, scale))
-        values = np.maximum(values, _UNDETERMINED * values.max())
-        return np.asarray((vectors / np.sqrt(values)).T / scale)
+        """Give W with W^T W the information, (6, 6)."""
+        scale = np.sqrt(np.maximum(np.diag(self.information), np.finfo(float).tiny))
+        values, vectors = np.linalg.eigh(self.information / np.outer(scale, scale))
+        # Along motions that are not determined rounding may be below 0.
+        return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))).T * scale)
 
     def twist(self, T_world_source: Array, T_world_target: Array) -> Array:
         """Give the twist, (6,), about `center`, from the measured pose to the one that two poses imply."""

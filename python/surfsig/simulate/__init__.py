@@ -18,7 +18,7 @@ from .acquisitions import RANDOM_TILT, Acquisition, Jitter, paper_acquisition, p
 from .ellipsoid import Ellipsoid
 from .height_field import HeightField
 from .machined_part import PART_SCANNER, part, part_scene
-from .places import block, corridor, forest, hall, pipes, plane, room, tunnel, upright_pose
+from .places import block, corridor, forest, hall, pipes, plane, room, storey, tunnel, upright_pose
 from .poses import UP, facing, pose, turn
 from .scanner import Scanner
 from .scene import Hits, Placed, Scene
@@ -64,6 +64,7 @@ __all__ = [
     "pose",
     "room",
     "scan",
+    "storey",
     "transform_points",
     "tunnel",
     "turn",

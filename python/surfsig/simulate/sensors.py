@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InvalidInputError
 from ..geometry import pose_array
@@ -201,7 +201,7 @@ def scan(
     ranges = hits.t
     if calibration is not None:
         width = sensor.steps if isinstance(sensor, Lidar) else sensor.width
-        ranges = _mixed(ranges, width, wrong.mixed, rng)
+        ranges = _mixed(ranges, hits.surface, width, wrong.mixed, rng)
         cosine = np.abs(np.einsum("ni,ni->n", directions, hits.normals))
         ranges = ranges * (1.0 + wrong.range_scale) + wrong.incidence * (1.0 - cosine)
     deviation = sensor.noise * (1.0 if is_lidar else hits.t[met] ** 2)
@@ -209,13 +209,16 @@ def scan(
     return PointCloud((ranges[:, None] * rays[met]).astype(np.float32), viewpoint=np.zeros(3))
 
 
-def _mixed(ranges: Array, width: int, share: float, rng: np.random.Generator) -> Array:
-    """Mix a share of the returns with those of the next ray of the line, where these lie apart."""
-    rows = ranges.reshape(-1, width)
+def _mixed(
+    ranges: Array, surface: NDArray[np.int32], width: int, share: float, rng: np.random.Generator
+) -> Array:
+    """Mix a share of the returns with those of the next ray of the line, where another surface lies apart."""
+    rows, surfaces = ranges.reshape(-1, width), surface.reshape(-1, width)
     following = np.roll(rows, -1, axis=1)
     drawn, part = rng.random(rows.shape), rng.random(rows.shape)
     with np.errstate(invalid="ignore"):
-        apart = np.abs(following - rows) > _EDGE * np.minimum(rows, following)
+        is_other = surfaces != np.roll(surfaces, -1, axis=1)
+        apart = is_other & (np.abs(following - rows) > _EDGE * np.minimum(rows, following))
         is_mixed = apart & np.isfinite(rows) & np.isfinite(following) & (drawn < share)
         mixed = np.where(is_mixed, rows + part * (following - rows), rows)
     return np.asarray(mixed.reshape(-1))

@@ -50,7 +50,12 @@ fn principal_axes(points: &[[f64; 3]]) -> Matrix3<f64> {
     let count = points.len().max(1) as f64;
     let middle = points.iter().map(|point| Vector3::from(*point)).sum::<Vector3<f64>>() / count;
     let off = |point: &[f64; 3]| Vector3::from(*point) - middle;
-    points.iter().map(|point| off(point) * off(point).transpose()).sum::<Matrix3<f64>>().symmetric_eigen().eigenvectors
+    points
+        .iter()
+        .map(|point| off(point) * off(point).transpose())
+        .sum::<Matrix3<f64>>()
+        .symmetric_eigen()
+        .eigenvectors
 }
 
 /// What halves say in excess of blocks: a covariance to be added to that of a least-squares solution.
@@ -194,7 +199,12 @@ mod tests {
     #[test]
     fn of_nothing_nothing_is_said() {
         assert_eq!(systematic_covariance(&[], &[], &halves(&[], &[]), &[]), Matrix6::zeros());
-        let flat = systematic_covariance(&[[0.0; 6]; 4], &[0.0; 4], &halves(&[[1.0; 3]; 4], &[[0.0; 3]; 4]), &[0; 4]);
+        let flat = systematic_covariance(
+            &[[0.0; 6]; 4],
+            &[0.0; 4],
+            &halves(&[[1.0; 3]; 4], &[[0.0; 3]; 4]),
+            &[0; 4],
+        );
         assert_eq!(flat, Matrix6::zeros());
     }
 }

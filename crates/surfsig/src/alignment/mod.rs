@@ -8,6 +8,7 @@
 
 mod clustered_covariance;
 mod consensus;
+mod doubt;
 mod even_sample;
 mod explained;
 mod gicp;
@@ -25,19 +26,22 @@ mod symmetry;
 pub(crate) use clustered_covariance::{blocks, clustered_covariance};
 pub use consensus::ConsensusSettings;
 pub(crate) use consensus::Correspondences;
+pub use doubt::Doubt;
 pub(crate) use even_sample::even_sample;
-pub(crate) use explained::{Closeness, Explained};
+pub(crate) use explained::Closeness;
 pub(crate) use gicp::gicp_with;
 pub use gicp::{GicpResult, GicpSettings, gicp};
 pub use gicp_cloud::GicpCloud;
 pub(crate) use gicp_cloud::{GicpTarget, plane_of};
-pub(crate) use least_squares::{LinearisedDistances, solve_determined};
 pub(crate) use halves::{halves, systematic_covariance};
+pub(crate) use least_squares::{LinearisedDistances, solve_determined};
 pub use observability::{FreeDirection, free_directions};
-pub(crate) use open_covariance::{infinite_along, motions_beyond, orthonormal, unscaled};
+pub(crate) use open_covariance::{
+    infinite_along, information_without, motions_beyond, orthonormal, unscaled,
+};
 pub(crate) use point_to_plane::{FACING_AWAY, OrientedSurface, cosine_towards, transformed};
 pub use point_to_surface::PointToSurfaceSettings;
 pub(crate) use point_to_surface::{PointToSurface, SURROUNDING, TargetSurface, surface_goes_on};
-pub(crate) use rivals::{FittedSurface, FittedTarget, Rivals};
 pub use rivals::{Alternative, RivalSettings};
+pub(crate) use rivals::{FittedSurface, FittedTarget, Rivals, ScaleLimits};
 pub(crate) use symmetry::symmetries;

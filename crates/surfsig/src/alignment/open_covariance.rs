@@ -1,5 +1,6 @@
 //! Covariances of transforms that are not determined in some directions: their variance is infinite there.
 
+use super::least_squares::pseudo_inverse;
 use nalgebra::{Matrix6, Vector6};
 
 /// Part of a unit motion along an axis, squared, below which the axis is not one of those that it moves along: what noise
@@ -7,21 +8,19 @@ use nalgebra::{Matrix6, Vector6};
 const NO_PART: f64 = 0.0025;
 /// Length of a motion after those before it are taken from it, of its own, below which it is one of them.
 const DEPENDENT: f64 = 1e-3;
+/// Of the largest eigenvalue of a covariance, below which it is rounding.
+const UNDETERMINED: f64 = 1e-12;
 
 /// The covariance with an infinite variance along motions: the limit of C + s^2 F F^T as s grows. Entries that the
 /// motions have no part in stay as they are without them.
 ///
 /// `unit` is the length by which a rotation moves points, per radian.
 pub(crate) fn infinite_along(covariance: &Matrix6<f64>, motions: &[Vector6<f64>], unit: f64) -> Matrix6<f64> {
-    let basis = orthonormal(motions, unit);
-    if basis.is_empty() {
+    let (finite, open) = separated(covariance, motions, unit);
+    if motions.is_empty() {
         return *covariance;
     }
-    let open: Matrix6<f64> = basis.iter().map(|motion| motion * motion.transpose()).sum();
     let lengths = lengths(unit);
-    let scaled = lengths * covariance * lengths;
-    let kept = Matrix6::identity() - open;
-    let finite = kept * scaled * kept;
     Matrix6::from_fn(|i, j| {
         if open[(i, j)].abs() < NO_PART {
             finite[(i, j)] / (lengths[(i, i)] * lengths[(j, j)])
@@ -29,6 +28,24 @@ pub(crate) fn infinite_along(covariance: &Matrix6<f64>, motions: &[Vector6<f64>]
             f64::INFINITY.copysign(open[(i, j)])
         }
     })
+}
+
+/// The inverse of that covariance, which is 0 along the motions.
+pub(crate) fn information_without(
+    covariance: &Matrix6<f64>,
+    motions: &[Vector6<f64>],
+    unit: f64,
+) -> Matrix6<f64> {
+    let (finite, _) = separated(covariance, motions, unit);
+    lengths(unit) * pseudo_inverse(finite, UNDETERMINED) * lengths(unit)
+}
+
+/// A covariance without motions, and what projects onto these, both with rotations as lengths.
+fn separated(covariance: &Matrix6<f64>, motions: &[Vector6<f64>], unit: f64) -> (Matrix6<f64>, Matrix6<f64>) {
+    let open: Matrix6<f64> =
+        orthonormal(motions, unit).iter().map(|motion| motion * motion.transpose()).sum();
+    let kept = Matrix6::identity() - open;
+    (kept * lengths(unit) * covariance * lengths(unit) * kept, open)
 }
 
 /// The motions, with rotations in units of `unit`, along which a covariance is larger than the square of a length.
@@ -71,7 +88,9 @@ mod tests {
 
     /// A covariance whose entries all differ.
     fn covariance() -> Matrix6<f64> {
-        let root = Matrix6::from_fn(|i, j| 1e-3 * ((1 + i * 7 + j * 3) % 11) as f64 + if i == j { 0.02 } else { 0.0 });
+        let root = Matrix6::from_fn(|i, j| {
+            1e-3 * ((1 + i * 7 + j * 3) % 11) as f64 + if i == j { 0.02 } else { 0.0 }
+        });
         root * root.transpose()
     }
 
@@ -88,6 +107,10 @@ mod tests {
         assert!((across.dot(&(large * across)) - across.dot(&(covariance() * across))).abs() < 1e-9);
         assert!((found[(5, 5)] - covariance()[(5, 5)]).abs() < 1e-12);
         assert_eq!(infinite_along(&covariance(), &[], 1.0), covariance());
+        let information = information_without(&covariance(), &[along], 2.0);
+        assert!((information * along).amax() < 1e-6 * information.amax());
+        let whole = information_without(&covariance(), &[], 2.0) * covariance();
+        assert!((whole - Matrix6::identity()).amax() < 1e-6);
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! Whether another transform explains as much as the best one: proposed ones, and pushes along motions that little
 //! holds.
 
-use super::explained::{Closeness, Explained, explained_share};
+use super::doubt::Doubt;
+use super::explained::{Closeness, Explained, HIDDEN, explained_share};
 use super::observability::{FreeDirection, Motions, UNOBSERVABLE};
 use super::point_to_surface::{PointToSurfaceSettings, TargetSurface};
+use super::scale::Scale;
 use crate::geometry::RigidTransform;
 
 /// A surface to which transforms are fitted anew, from starts that may be far off.
@@ -15,6 +17,15 @@ pub(crate) trait FittedSurface: Sync {
     fn closeness(&self, moved: &[[f64; 3]]) -> Closeness;
 }
 
+/// From when on a source counts as larger or smaller than the target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ScaleLimits {
+    /// Logarithm of the scale.
+    pub doubted: f64,
+    /// The same in its standard errors.
+    pub deviations: f64,
+}
+
 /// A target's surface with the distance up to which points count.
 pub(crate) struct FittedTarget<'a> {
     pub surface: &'a TargetSurface,
@@ -22,6 +33,29 @@ pub(crate) struct FittedTarget<'a> {
     pub farthest: f64,
     /// How transforms that are far off are fitted.
     pub fit: PointToSurfaceSettings,
+    /// Whether a point cannot have been seen from where the target was: what the target lacks there speaks neither for
+    /// a transform nor against it. An empty hall whose sensors are mirrored by a half turn is explained best by that.
+    pub is_hidden: &'a (dyn Fn([f64; 3]) -> bool + Sync),
+}
+
+impl FittedTarget<'_> {
+    /// The scale of points that a transform has brought near, and the doubt whether it is 1: where another one differs
+    /// from it significantly and explains more.
+    pub fn scale(
+        &self,
+        moved: &[[f64; 3]],
+        best: &Explained,
+        limits: ScaleLimits,
+    ) -> (Option<Scale>, Option<Doubt>) {
+        let Some(found) = self.surface.scale_of(moved, &self.fit) else { return (None, None) };
+        let Scale { scale, standard_error, .. } = found;
+        let off = scale.ln().abs();
+        let is_significant = off > limits.deviations * standard_error / scale && off > limits.doubted;
+        let explains_more =
+            || best.deficit_of(&self.closeness(&found.points)).is_some_and(|(deficit, _)| deficit < 0.0);
+        let doubt = (is_significant && explains_more()).then_some(Doubt::Scale { scale, standard_error });
+        (Some(found), doubt)
+    }
 }
 
 impl FittedSurface for FittedTarget<'_> {
@@ -30,7 +64,14 @@ impl FittedSurface for FittedTarget<'_> {
     }
 
     fn closeness(&self, moved: &[[f64; 3]]) -> Closeness {
-        self.surface.closeness(moved, self.farthest, &self.fit)
+        let mut closeness = self.surface.closeness(moved, self.farthest, &self.fit);
+        for (one, point) in closeness.iter_mut().zip(moved) {
+            // What lies on the surface is seen, whatever the range image's pixels say.
+            if one.is_some_and(|share| share <= 0.0) && (self.is_hidden)(*point) {
+                *one = Some(HIDDEN);
+            }
+        }
+        closeness
     }
 }
 

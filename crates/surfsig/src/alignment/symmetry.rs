@@ -31,7 +31,7 @@ const MOST: usize = 24;
 /// most of it is near the target; `normals` are those of the target where the source meets it.
 ///
 /// Axes are those of the largest three faces at right angles, as rooms and boxes have; each rotation takes the middle of
-/// the source to that of the target.
+/// the source to that of the target, and is tried about that of the target, too, as the source may be a part.
 pub(crate) fn symmetries(
     target: &[[f64; 3]],
     normals: &[[f64; 3]],
@@ -44,20 +44,22 @@ pub(crate) fn symmetries(
         some_of(moved.len(), TRIED_POINTS).into_iter().map(|number| moved[number]).collect();
     let tree = KdTree::new(target);
     let share = |motion: &RigidTransform| {
-        let is_near = |point: &&[f64; 3]| tree.nearest(motion.transform_point(**point), NEAR * radius).is_some();
+        let is_near =
+            |point: &&[f64; 3]| tree.nearest(motion.transform_point(**point), NEAR * radius).is_some();
         some.iter().filter(is_near).count()
     };
     let least = LEAST_SHARE * share(&RigidTransform::identity()) as f64;
-    let about_middle = |rotation: &Rotation3<f64>| RigidTransform {
+    let about = |rotation: &Rotation3<f64>, from: &Vector3<f64>| RigidTransform {
         rotation: rotation.into_inner(),
         translation: to - rotation * from,
     };
-    let mut found: Vec<(usize, RigidTransform)> = rotations(&axes)
-        .iter()
-        .map(about_middle)
-        .map(|motion| (share(&motion), motion))
-        .filter(|(count, _)| *count as f64 >= least)
-        .collect();
+    let better = |rotation: &Rotation3<f64>| {
+        let [one, other] =
+            [from, to].map(|from| about(rotation, &from)).map(|motion| (share(&motion), motion));
+        if other.0 > one.0 { other } else { one }
+    };
+    let mut found: Vec<(usize, RigidTransform)> =
+        rotations(&axes).iter().map(better).filter(|(count, _)| *count as f64 >= least).collect();
     found.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
     found.into_iter().take(MOST).map(|(_, motion)| motion).collect()
 }
@@ -76,10 +78,12 @@ fn axes_of_faces(normals: &[[f64; 3]]) -> Option<Matrix3<f64>> {
 
 /// The mean of the normals that are parallel to the one to which most are, whichever side they are on.
 fn largest_face(normals: &[Vector3<f64>]) -> Option<Vector3<f64>> {
-    let parallel = |one: &Vector3<f64>| normals.iter().filter(|other| one.dot(other).abs() > PARALLEL).count();
+    let parallel =
+        |one: &Vector3<f64>| normals.iter().filter(|other| one.dot(other).abs() > PARALLEL).count();
     let counts: Vec<usize> = normals.iter().map(parallel).collect();
     // Of equal counts the first.
-    let best = (0..normals.len()).reduce(|best, other| if counts[other] > counts[best] { other } else { best })?;
+    let best =
+        (0..normals.len()).reduce(|best, other| if counts[other] > counts[best] { other } else { best })?;
     let same_side = |other: &Vector3<f64>| *other * other.dot(&normals[best]).signum();
     let all = normals.iter().filter(|other| normals[best].dot(other).abs() > PARALLEL).map(same_side);
     all.sum::<Vector3<f64>>().try_normalize(f64::MIN_POSITIVE)
@@ -88,7 +92,8 @@ fn largest_face(normals: &[Vector3<f64>]) -> Option<Vector3<f64>> {
 /// The middle of what points cover along axes.
 fn middle(points: &[[f64; 3]], axes: &Matrix3<f64>) -> Vector3<f64> {
     let along = |k: usize| {
-        let mut values: Vec<f64> = points.iter().map(|point| axes.column(k).dot(&Vector3::from(*point))).collect();
+        let mut values: Vec<f64> =
+            points.iter().map(|point| axes.column(k).dot(&Vector3::from(*point))).collect();
         0.5 * (quantile(&mut values, BEYOND) + quantile(&mut values, 1.0 - BEYOND))
     };
     axes * Vector3::new(along(0), along(1), along(2))

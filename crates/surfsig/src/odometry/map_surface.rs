@@ -41,7 +41,10 @@ impl<'a> MapSurface<'a> {
         let normal = Vector3::from(self.map.normal(index)?);
         let goes_on = self.goes_on[index as usize].get_or_init(|| self.map.goes_on(index, &mut Vec::new()));
         goes_on.then_some(())?;
-        Some((normal.dot(&(Vector3::from(*point) - Vector3::from(self.map.points()[index as usize]))), normal))
+        Some((
+            normal.dot(&(Vector3::from(*point) - Vector3::from(self.map.points()[index as usize]))),
+            normal,
+        ))
     }
 
     fn residuals(&self, points: &[[f64; 3]]) -> Vec<Option<(f64, Vector3<f64>)>> {

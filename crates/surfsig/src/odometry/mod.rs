@@ -198,8 +198,10 @@ fn in_frames(step: &Step, scan: usize, sensors: [[f64; 3]; 2], voxel: f64, unit:
     let adjoint = from_sensor.adjoint();
     let carried = Matrix6::from_fn(|i, j| adjoint[i][j] * if j < 3 { 1.0 } else { voxel });
     let both = step.covariance.random + step.covariance.systematic;
-    let open: Vec<Vector6<f64>> =
-        motions_beyond(&step.covariance.open, LEAST_OPEN, unit / voxel).iter().map(|motion| carried * motion).collect();
+    let open: Vec<Vector6<f64>> = motions_beyond(&step.covariance.open, LEAST_OPEN, unit / voxel)
+        .iter()
+        .map(|motion| carried * motion)
+        .collect();
     let covariance = infinite_along(&(carried * both * carried.transpose()), &open, unit);
     let in_unit = |direction: &FreeDirection| match *direction {
         FreeDirection::Translation { axis } => FreeDirection::Translation { axis },

@@ -1,10 +1,9 @@
 //! The tests that a transform must survive before it is trusted.
 
-use super::doubt::Doubt;
 use super::free_space::BothSensors;
 use super::settings::RegistrationSettings;
 use crate::alignment::{
-    Alternative, Explained, FittedSurface, FittedTarget, FreeDirection, PointToSurface, Rivals, TargetSurface,
+    Alternative, Doubt, FittedTarget, FreeDirection, PointToSurface, Rivals, ScaleLimits, TargetSurface,
     symmetries,
 };
 use crate::geometry::RigidTransform;
@@ -46,11 +45,13 @@ impl Judge<'_> {
         let settings = self.settings;
         let numbers = some_of(self.sample.len(), settings.rivals.points);
         let some: Vec<[f64; 3]> = numbers.into_iter().map(|i| self.sample[i]).collect();
+        let is_hidden = |point: [f64; 3]| self.sensors.is_hidden_from_target(point);
         let rivals = Rivals {
             surface: FittedTarget {
                 surface: self.surface,
                 farthest: found.farthest,
                 fit: settings.rival_fit,
+                is_hidden: &is_hidden,
             },
             source: &some,
             T_target_source: found.T_target_source,
@@ -94,7 +95,12 @@ impl Judge<'_> {
             scale: f64::NAN,
             scale_standard_error: f64::NAN,
         };
-        self.scale(&moved, &rivals.surface, &best, &mut judged);
+        let limits = ScaleLimits { doubted: settings.doubted_scale, deviations: settings.scale_deviations };
+        let (scale, doubt) = rivals.surface.scale(&moved, &best, limits);
+        if let Some(scale) = scale {
+            (judged.scale, judged.scale_standard_error) = (scale.scale, scale.standard_error);
+        }
+        judged.doubts.extend(doubt);
         self.doubt(found, inliers, &mut judged);
         judged
     }
@@ -124,28 +130,6 @@ impl Judge<'_> {
         }
         if !judged.alternatives.is_empty() {
             doubts.push(Doubt::Ambiguous { alternatives: judged.alternatives.len() });
-        }
-    }
-
-    /// Whether a source of another size fits better.
-    fn scale(
-        &self,
-        moved: &[[f64; 3]],
-        surface: &FittedTarget<'_>,
-        best: &Explained,
-        judged: &mut Judgement,
-    ) {
-        let Some(found) = self.surface.scale_of(moved, &self.settings.rival_fit) else { return };
-        judged.scale = found.scale;
-        judged.scale_standard_error = found.standard_error;
-        let off = found.scale.ln().abs();
-        let is_significant = off > self.settings.scale_deviations * found.standard_error / found.scale;
-        let deficit = best.deficit_of(&surface.closeness(&found.points));
-        if is_significant
-            && off > self.settings.doubted_scale
-            && deficit.is_some_and(|(deficit, _)| deficit < 0.0)
-        {
-            judged.doubts.push(Doubt::Scale { scale: found.scale, standard_error: found.standard_error });
         }
     }
 }
