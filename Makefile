@@ -11,7 +11,7 @@ PREFIX ?= /usr/local
 # What the compiled module is made from; a change of any rebuilds it.
 SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -name '*.bin' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: help demo test test-all lint format bench bench-reading bench-error bench-segmentation bench-intervals bench-registration bench-finding bench-odometry fuzz docs tour wheel check-wheel header install-c clean build bench-scale
+.PHONY: help demo test test-all lint format bench bench-reading bench-error bench-segmentation bench-intervals bench-registration bench-finding bench-odometry bench-trust bench-covariance bench-multiway fuzz docs tour wheel check-wheel header install-c clean build bench-scale
 .DEFAULT_GOAL := help
 
 help: ## Say what there is to make
@@ -66,6 +66,15 @@ bench-finding: build ## Look for objects in simulated and real scenes, and write
 
 bench-odometry: build ## Follow sensors through a simulated building, and write that part of BENCHMARKS.md
 	$(BIN)/python benchmarks/odometry.py --write
+
+bench-trust: build ## Register pairs that deceive, and write that part of BENCHMARKS.md
+	$(BIN)/python benchmarks/trust.py --write
+
+bench-covariance: build ## Compare errors of poses with their covariances, and write that part of BENCHMARKS.md
+	$(BIN)/python benchmarks/covariance.py --write
+
+bench-multiway: build ## Register many scans at once, and write that part of BENCHMARKS.md
+	$(BIN)/python benchmarks/multiway.py --write
 
 bench-scale: build ## Work on millions of points in tiles, and write that part of BENCHMARKS.md: make bench-scale POINTS="20 60 200"
 	$(BIN)/python benchmarks/scale.py --points $(POINTS) --write

@@ -152,6 +152,7 @@ class RegistrationSettings:
         rival_distance: float | None = None,
         rival_push: float | None = None,
         rival_nudge: float | None = None,
+        rival_nudge_deficit: float | None = None,
         rival_weak: float | None = None,
         rival_deficit: float | None = None,
         rival_deviations: float | None = None,
@@ -231,6 +232,9 @@ class RegistrationSettings:
     @property
     def rival_nudge(self) -> float:
         """Part of such a push that alone must leave the source on the surface."""
+    @property
+    def rival_nudge_deficit(self) -> float:
+        """What the source explains less then, as a share, to be held."""
     @property
     def rival_weak(self) -> float:
         """Distances from the surface over the points' paths, below which a motion is weakly held."""

@@ -1,4 +1,4 @@
-"""Instances whose pose is not the only one: symmetric models, and copies of another size."""
+"""Instances whose pose is not the only one: symmetric models."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ POSE[:3, 3] = (0.05, -0.02, 1.2)
 """T_camera_object: three faces of a box are seen."""
 
 
-def surface_of(surface: simulate.Surface, count: int = 8000) -> PointCloud:
-    """Points all over a surface, by rays from a sphere around it."""
+def surface_of(surface: simulate.Surface, half: tuple[float, float, float], count: int = 12000) -> PointCloud:
+    """Points all over a surface, by rays from a sphere around it to random points within."""
     rng = np.random.default_rng(1)
-    directions = rng.normal(size=(count, 3))
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    inwards = 0.3 * rng.normal(size=(count, 3)) - directions
-    inwards /= np.linalg.norm(inwards, axis=1)[:, None]
-    hits = simulate.Scene([simulate.Placed(surface)]).cast(2.0 * directions, inwards)
+    origins = rng.normal(size=(count, 3))
+    origins *= 2.0 / np.linalg.norm(origins, axis=1)[:, None]
+    rays = rng.uniform(-1.0, 1.0, (count, 3)) * half - origins
+    rays /= np.linalg.norm(rays, axis=1)[:, None]
+    hits = simulate.Scene([simulate.Placed(surface)]).cast(origins, rays)
     return PointCloud(hits.points[np.isfinite(hits.t)])
 
 
@@ -38,7 +38,7 @@ BOX = simulate.Box((0.5, 0.35, 0.22))
 
 @pytest.fixture(scope="module")
 def box() -> surfsig.Instance:
-    found = surfsig.find_instances(surface_of(BOX), seen(BOX))
+    found = surfsig.find_instances(surface_of(BOX, (0.25, 0.175, 0.11)), seen(BOX))
     assert len(found) >= 1
     return found[0]
 
@@ -57,23 +57,14 @@ def test_it_is_not_trusted_and_says_why(box: surfsig.Instance) -> None:
     assert "3 other transforms explain as much" in box.reasons[0]
     assert box.values()["trusted"] is False
     assert len(box.values()["alternatives"]) == 3
-    assert abs(box.scale - 1.0) < 0.01
     assert np.isfinite(box.covariance).all()
 
 
 def test_a_cylinder_turns_about_its_axis_with_infinite_variance() -> None:
     cylinder = simulate.Cylinder(0.12, 0.5)
-    found = surfsig.find_instances(surface_of(cylinder), seen(cylinder))[0]
+    found = surfsig.find_instances(surface_of(cylinder, (0.08, 0.08, 0.25)), seen(cylinder))[0]
     rotations = [one for one in found.free_directions if one.motion == "rotation"]
     assert len(rotations) == 1
     assert abs(rotations[0].axis @ POSE[:3, 2]) > 0.999
     assert "free_directions" in found.doubts
     assert np.isinf(np.diag(found.covariance)[:3]).all()
-
-
-def test_a_copy_of_another_size_is_said_to_be_one() -> None:
-    larger = simulate.Box((0.525, 0.3675, 0.231))
-    found = surfsig.find_instances(surface_of(BOX), seen(larger))
-    for instance in found:
-        assert not instance.trusted
-    assert any("scale" in instance.doubts and abs(instance.scale - 1.05) < 0.01 for instance in found)

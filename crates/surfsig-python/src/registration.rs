@@ -67,6 +67,8 @@ settings_class! {
         rival_push: f64 = rivals.push,
         /// Part of such a push that alone must leave the source on the surface.
         rival_nudge: f64 = rivals.nudge,
+        /// What the source explains less then, as a share, to be held.
+        rival_nudge_deficit: f64 = rivals.nudge_deficit,
         /// Distances from the surface over the points' paths, below which a motion is weakly held.
         rival_weak: f64 = rivals.weak,
         /// What a rival explains less, as a share, at least, to be refuted.

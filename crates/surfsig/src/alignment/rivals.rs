@@ -98,6 +98,9 @@ pub struct RivalSettings {
     /// Part of such a push that alone, without a fit, must leave the source on the surface where a motion is free: a
     /// large one may take the few points that hold it to another surface.
     pub nudge: f64,
+    /// What the source explains less then, as a share, to be held: in smooth corridors, tunnels and on planes it loses
+    /// nothing but noise, and shallow niches are a few in a hundred of a corridor's points.
+    pub nudge_deficit: f64,
     /// The root mean square of the distances from the surface over the points' paths, below which a motion is weakly
     /// held.
     pub weak: f64,
@@ -116,6 +119,7 @@ impl Default for RivalSettings {
             distance: 1.0,
             push: 0.5,
             nudge: 0.33,
+            nudge_deficit: 0.01,
             weak: 0.25,
             deficit: 0.03,
             deviations: 3.0,
@@ -164,23 +168,31 @@ impl<S: FittedSurface> Rivals<'_, S> {
         self.surface.closeness(&transform.transform_points(self.source))
     }
 
-    /// The transform that a start leads to, and the share that it explains, if that is as much as the best one does.
-    fn as_good(&self, explained: &Explained, start: RigidTransform) -> Option<(RigidTransform, f64)> {
+    /// The transform that a start leads to, and the share that it explains, if that is as much as the best one does, but
+    /// for a deficit that depends on the transform.
+    fn as_good(
+        &self,
+        explained: &Explained,
+        start: RigidTransform,
+        deficit: impl Fn(&RigidTransform) -> f64,
+    ) -> Option<(RigidTransform, f64)> {
         let found = self.surface.fitted(self.source, start)?;
         let closeness = self.closeness(&found);
-        let is_refuted = self.is_refuted(explained, &closeness);
+        let is_refuted = self.is_refuted(explained, &closeness, deficit(&found));
         (!is_refuted).then(|| (found, explained_share(&closeness)))
     }
 
-    /// Those of proposed transforms that explain as much and lead elsewhere.
+    /// Those of proposed transforms that explain as much and lead elsewhere; `deficit` is the share of what the best one
+    /// explains that each may lack.
     pub fn as_good_as_the_best(
         &self,
         explained: &Explained,
         proposed: &[RigidTransform],
+        deficit: impl Fn(&RigidTransform) -> f64,
     ) -> Vec<(RigidTransform, f64)> {
         let mut found: Vec<(RigidTransform, f64)> = Vec::new();
         for start in proposed {
-            let Some((transform, share)) = self.as_good(explained, *start) else { continue };
+            let Some((transform, share)) = self.as_good(explained, *start, &deficit) else { continue };
             let is_elsewhere = |other: &RigidTransform| {
                 self.displacement(&transform, other) > self.settings.distance * self.radius
             };
@@ -207,11 +219,19 @@ impl<S: FittedSurface> Rivals<'_, S> {
                 || sliding <= self.settings.weak && {
                     let pushed = |length: f64| motions.along(number, length) * self.T_target_source;
                     let nudge = self.settings.nudge * length;
-                    let slides = |length: f64| !self.is_refuted(explained, &self.closeness(&pushed(length)));
+                    let slides = |length: f64| {
+                        !self.is_refuted(
+                            explained,
+                            &self.closeness(&pushed(length)),
+                            self.settings.nudge_deficit,
+                        )
+                    };
                     let stays_away = |length: f64| {
-                        self.as_good(explained, pushed(length)).is_some_and(|(transform, _)| {
-                            self.displacement(&transform, &self.T_target_source) > 0.5 * length.abs()
-                        })
+                        self.as_good(explained, pushed(length), |_| self.settings.deficit).is_some_and(
+                            |(transform, _)| {
+                                self.displacement(&transform, &self.T_target_source) > 0.5 * length.abs()
+                            },
+                        )
                     };
                     [nudge, -nudge].into_iter().any(slides) && [length, -length].into_iter().any(stays_away)
                 }
@@ -219,10 +239,10 @@ impl<S: FittedSurface> Rivals<'_, S> {
     }
 
     /// Whether so much less is explained that it is no chance; also where much less of the surface is met.
-    fn is_refuted(&self, explained: &Explained, closeness: &Closeness) -> bool {
-        explained.deficit_of(closeness).is_none_or(|(deficit, error)| {
-            deficit > self.settings.deficit && deficit > self.settings.deviations * error
-        })
+    fn is_refuted(&self, explained: &Explained, closeness: &Closeness, allowed: f64) -> bool {
+        explained
+            .deficit_of(closeness)
+            .is_none_or(|(deficit, error)| deficit > allowed && deficit > self.settings.deviations * error)
     }
 
     fn displacement(&self, one: &RigidTransform, other: &RigidTransform) -> f64 {

@@ -69,7 +69,7 @@ impl Refined<'_> {
             rival.judged(is_free).score >= (1.0 - settings.rival_deficit) * score
         };
         let alternatives: Vec<RigidTransform> = rivals
-            .as_good_as_the_best(&best, &proposed)
+            .as_good_as_the_best(&best, &proposed, |_| settings.rivals.deficit)
             .into_iter()
             .map(|(transform, _)| transform.inverse())
             .filter(is_as_good)

@@ -67,8 +67,13 @@ impl Judge<'_> {
             .copied()
             .chain(symmetric.into_iter().map(|symmetry| symmetry * found.T_target_source))
             .collect();
+        // Where less is in free space, something that only one scan shows may explain less.
+        let deficit = |transform: &RigidTransform| {
+            let is_freer = self.sensors.free_space(transform) < free_space - settings.free_space.excess;
+            if is_freer { settings.free_space.deficit } else { settings.rivals.deficit }
+        };
         let alternatives: Vec<Alternative> = rivals
-            .as_good_as_the_best(&best, &proposed)
+            .as_good_as_the_best(&best, &proposed, deficit)
             .into_iter()
             .map(|(transform, explained)| Alternative {
                 T_target_source: transform,
