@@ -84,3 +84,23 @@ def test_the_reference_changes_nothing_but_the_axes(first: int) -> None:
     other = solve(5, 4, edges).T_world_scan
     relative = [np.linalg.inv(each[1]) @ each[3] for each in (found, other)]
     assert np.abs(relative[0] - relative[1]).max() < 1e-5
+
+
+def test_a_motion_that_no_edge_determines_has_an_infinite_variance() -> None:
+    poses = truth(3, 8)
+    known = edge(poses, 1, 0, 9)
+    # Of the second edge the translation along z of the target is not known.
+    measured = edge(poses, 2, 1, 9)
+    open_along = measured.information.copy()
+    open_along[5, :] = open_along[:, 5] = 0.0
+    slides = Edge(2, 1, measured.T_target_source, open_along, measured.center, 1.0)
+    found = solve(3, 0, [known, slides])
+    assert np.isfinite(found.covariance[1]).all()
+    assert np.isinf(found.covariance[2][3:, 3:]).any()
+    along = geometry.inverse(poses[2])[:3, :3] @ poses[1][:3, 2]
+    open_part = np.isinf(np.diag(found.covariance[2])[3:])
+    np.testing.assert_array_equal(open_part, along**2 > 0.0025)
+    assert np.isfinite(found.covariance[2][:3, :3]).all()
+    # With another edge that knows it, nothing is open.
+    whole = solve(3, 0, [known, slides, edge(poses, 2, 0, 9)])
+    assert np.isfinite(whole.covariance).all()

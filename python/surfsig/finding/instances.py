@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.cloud_transforms import transform_cloud
 from surfsig.colors import GREY, distinct_colors
-from surfsig.digits import position_text, rounded
+from surfsig.digits import finite_rows, position_text, rounded
 from surfsig.point_cloud import PointCloud
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class Instance:
         return {
             "name": self.name,
             "T_scene_model": self.T_scene_model.tolist(),
-            "covariance": self.covariance.tolist(),
+            "covariance": finite_rows(self.covariance),
             "center": self.center.tolist(),
             "score": self.score,
             "visible": self.visible,

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfsig import cloud_transforms, geometry
 from surfsig.alignment.free_directions import FreeDirection
-from surfsig.digits import position_text
+from surfsig.digits import finite_rows, position_text
 from surfsig.point_cloud import PointCloud, coordinate_array
 
 Array = NDArray[np.float64]
@@ -210,7 +210,7 @@ class Registration:
         known = bool(np.isfinite(self.T_target_source).all())
         return {
             "T_target_source": self.T_target_source.tolist() if known else None,
-            "covariance": [[_known(value) for value in row] for row in self.covariance.tolist()] if known else None,
+            "covariance": finite_rows(self.covariance) if known else None,
             "information": self.information.tolist() if known else None,
             "center": self.center.tolist() if known else None,
             "free_directions": [free.values() for free in self.free_directions],
