@@ -77,7 +77,9 @@ def with_traffic(scene: simulate.Scene, sensor: Array, seed: int, time: float) -
 def scan(scene: simulate.Scene, pose: Array, sensor: Sensor, seed: int, time: float) -> PointCloud:
     """Scan a place at a time."""
     there = with_traffic(scene, pose, seed, time) if sensor.traffic else scene
-    return simulate.scan(there, LIDAR, pose, seed=1000 * seed + int(10 * time), calibration=sensor.calibration)
+    return simulate.scan(
+        there, LIDAR, pose, seed=1000 * seed + int(10 * time), calibration=sensor.calibration
+    )
 
 
 def share_of_covariance(twist: Array, covariance: Array) -> float:
@@ -88,11 +90,13 @@ def share_of_covariance(twist: Array, covariance: Array) -> float:
     return float(twist / scale @ np.linalg.solve(covariance / np.outer(scale, scale), twist / scale) / 6.0)
 
 
-def of_registration(found: surfsig.Registration, truth: Array) -> tuple[float, float, float]:
+def of_registration(found: surfsig.Registration, truth: Array | None) -> tuple[float, float, float]:
     """Give the share, and the errors of the place of the overlap's middle: true, and as the covariance says.
 
     NaN where the pose is wrong, not inaccurate.
     """
+    if truth is None:
+        return (float("nan"), float("nan"), float("nan"))
     to_center = geometry.from_translation(found.center)
     off = geometry.inverse(to_center) @ truth @ geometry.inverse(found.T_target_source) @ to_center
     said = float(np.sqrt(np.diag(found.covariance)[3:].sum()))
@@ -114,9 +118,7 @@ def of_pair(place: str, name: str, seed: int) -> tuple[float, float, float]:
         )
         for side in (-0.5, 0.5)
     ]
-    source, target = (
-        scan(scene, pose, sensor, seed, PAUSE * number) for number, pose in enumerate(poses)
-    )
+    source, target = (scan(scene, pose, sensor, seed, PAUSE * number) for number, pose in enumerate(poses))
     found = surfsig.register(source, target)
     truth = geometry.inverse(poses[1]) @ poses[0]
     return of_registration(found, truth)

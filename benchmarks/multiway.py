@@ -2,9 +2,9 @@
 
 python benchmarks/multiway.py --write
 
-Eight simulated tripod scans of a storey, one in each room, of which neighbours share about 30 %; the same with
-two scans of another building among them; and the Stanford bunny's views. Each scan is turned and moved at
-random.
+Eight simulated tripod scans of a storey, one in each room, of which neighbours share about 30 %; the same
+with two scans of another building among them; and the Stanford bunny's views. Each scan is turned and moved
+at random.
 """
 
 from __future__ import annotations
@@ -61,9 +61,7 @@ def storey(seed: int, others: int) -> Views:
     belongs = np.arange(len(scans)) < len(scans) - others
     rng = np.random.default_rng([52, seed])
     order = rng.permutation(len(scans))
-    return Views(
-        [scans[k] for k in order], [poses[k] for k in order], belongs[order], DEGREES, METRES
-    )
+    return Views([scans[k] for k in order], [poses[k] for k in order], belongs[order], DEGREES, METRES)
 
 
 def _tripods(seed: int, count: int, first: int) -> tuple[list[PointCloud], list[Array]]:
@@ -107,7 +105,7 @@ def bunny(data: Path, seed: int) -> Views | None:
 
 
 def overlap(views: Views) -> float:
-    """Give the mean over the scans that belong of the largest share that another scan of the place has, too."""
+    """Give the mean over scans that belong of the largest share that another scan of the place has, too."""
     moved = [
         geometry.transform_points(pose, scan.points[::7].astype(np.float64))
         for pose, scan in zip(views.poses, views.scans, strict=True)
@@ -116,14 +114,18 @@ def overlap(views: Views) -> float:
     trees = [cKDTree(points) for points in moved]
     reach = NEAR if views.distance == METRES else views.distance
     shares = [
-        max(np.mean(trees[b].query(moved[a], distance_upper_bound=reach)[0] < reach) for b in numbers if b != a)
+        max(
+            np.mean(trees[b].query(moved[a], distance_upper_bound=reach)[0] < reach)
+            for b in numbers
+            if b != a
+        )
         for a in numbers
     ]
     return float(np.mean(shares))
 
 
 def scores(views: Views, found: surfsig.MultiwayRegistration) -> tuple[int, int, int]:
-    """Count the scans whose pose is right, those whose pose is wrong, and those that do not belong and are named."""
+    """Count scans with a right pose, those with a wrong one, and strangers that are named."""
     right = wrong = 0
     reference = found.reference
     to_reference = geometry.inverse(views.poses[reference])

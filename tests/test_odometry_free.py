@@ -1,4 +1,4 @@
-"""Sequences through places that leave a motion open: it is named, its variance is infinite, and the last one goes on."""
+"""Places that leave a motion open: it is named, its variance is infinite, and the last one goes on."""
 
 from __future__ import annotations
 
@@ -77,7 +77,9 @@ def test_a_motion_that_was_known_before_goes_on() -> None:
     """Away from the end of a corridor, whose wall is out of reach after some steps."""
     poses = [simulate.upright_pose(STEP * k - 26.5, 0.0, 1.2, 0.5) for k in range(10)]
     sensor = simulate.Lidar(lines=32, steps=360, elevation=(-25.0, 25.0), max_range=5.0)
-    scans = [simulate.scan(simulate.corridor(3), sensor, pose, seed=number) for number, pose in enumerate(poses)]
+    scans = [
+        simulate.scan(simulate.corridor(3), sensor, pose, seed=number) for number, pose in enumerate(poses)
+    ]
     found = surfsig.estimate_odometry(scans)
     assert found.counts()["tracked"] == len(poses)
     assert np.abs(errors_in_place(found, poses)).max() < 0.1

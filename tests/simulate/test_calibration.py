@@ -13,7 +13,7 @@ EXACT = simulate.Lidar(lines=16, steps=90, noise=0.0)
 
 def ranges(calibration: simulate.Calibration | None) -> np.ndarray:
     cloud = simulate.scan(ROOM, EXACT, POSE, calibration=calibration)
-    return np.linalg.norm(cloud.points.astype(np.float64), axis=1)
+    return np.asarray(np.linalg.norm(cloud.points.astype(np.float64), axis=1))
 
 
 def test_without_errors_nothing_changes() -> None:

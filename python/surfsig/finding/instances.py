@@ -50,8 +50,8 @@ class Instance:
     free_directions: list[FreeDirection]
     """Motions, in the scene's coordinates, in which what is seen does not hold the model."""
     alternatives: list[Array]
-    """Other poses T_scene_model, (4, 4) each, that explain as much of what is seen, as of a box that looks the
-    same after half a turn."""
+    """Other poses T_scene_model, (4, 4) each, that explain as much of what is seen, as of a box that looks
+    the same after half a turn."""
     scale: float
     """How many times as large as the model the instance is, by a similarity transform; NaN where what is seen
     does not determine it. The pose itself is rigid."""
@@ -67,8 +67,11 @@ class Instance:
 
     @property
     def trusted(self) -> bool:
-        """Whether the pose was tried to be refuted and was not: it is the only one that explains as much, all
-        of it is determined, and the instance is as large as the model."""
+        """Whether the pose was tried to be refuted, and was not.
+
+        It is the only one that explains as much, all of it is determined, and the instance is as large as the
+        model.
+        """
         return not self.doubts
 
     def __repr__(self) -> str:

@@ -45,7 +45,8 @@ def estimate_odometry(
     the last motion leads. Where it lies there worse than scans did of late, it is searched among keyframes by
     the signatures of its keypoints; a pose that is found so counts only if the map explains all of the scan,
     or the next scans follow it. Where the map leaves a motion open, as along a smooth corridor, that is named
-    (`Odometry.free_directions`), its variance is infinite, and the last motion goes on in it. Nothing needs to be set, and the result is always the same.
+    (`Odometry.free_directions`), its variance is infinite, and the last motion goes on in it. Nothing
+    needs to be set, and the result is always the same.
 
     Parameters
     ----------

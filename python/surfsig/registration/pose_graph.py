@@ -31,8 +31,8 @@ class Edge:
     T_target_source: Array
     """(4, 4)."""
     information: Array
-    """(6, 6), the inverse of the covariance of the twist about `center` in the target's axes, rotation first; 0
-    along motions that are not determined."""
+    """(6, 6), the inverse of the covariance of the twist about `center` in the target's axes, rotation
+    first; 0 along motions that are not determined."""
     center: Array
     """(3,), in the target's coordinates."""
     weight: float
@@ -145,9 +145,7 @@ def solve(count: int, first: int, edges: Sequence[Edge]) -> Solution:
     for scan, start in column.items():
         own = np.s_[start : start + 6, start : start + 6]
         block = max(1.0, factor) * inverse[own] * np.outer(unit, unit)
-        covariance[scan] = np.where(
-            np.abs(unknown[own]) < _NO_PART, block, np.copysign(np.inf, unknown[own])
-        )
+        covariance[scan] = np.where(np.abs(unknown[own]) < _NO_PART, block, np.copysign(np.inf, unknown[own]))
     return Solution(poses, covariance, residuals)
 
 

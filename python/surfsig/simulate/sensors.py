@@ -13,7 +13,6 @@ from ..point_cloud import PointCloud
 from .poses import Array
 from .scene import Scene
 
-
 _EDGE = 0.05
 """Share of the range by which two neighbouring returns differ at an edge."""
 

@@ -41,7 +41,7 @@ fn slabs(values: &[f64], count: usize) -> Vec<bool> {
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let mut is_even = vec![false; values.len()];
     for (rank, number) in order.into_iter().enumerate() {
-        is_even[number] = rank * count / values.len() % 2 == 0;
+        is_even[number] = (rank * count / values.len()).is_multiple_of(2);
     }
     is_even
 }

@@ -233,7 +233,7 @@ impl<S: FittedSurface> Rivals<'_, S> {
                             },
                         )
                     };
-                    [nudge, -nudge].into_iter().any(slides) && [length, -length].into_iter().any(stays_away)
+                    [nudge, -nudge].into_iter().all(slides) && [length, -length].into_iter().any(stays_away)
                 }
         })
     }
