@@ -150,6 +150,8 @@ class ScanPose(Structure):
         ("overlap", c_double),
         ("T_map_scan", Transform),
         ("covariance", c_double * 36),
+        ("free_direction_count", c_size_t),
+        ("free_directions", FreeDirection * 6),
     )
 
 

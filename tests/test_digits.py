@@ -92,6 +92,11 @@ def test_found_instances_have_the_digits_of_their_errors() -> None:
         overlap=0.5,
         rms=0.001,
         free_directions=[],
+        alternatives=[],
+        scale=1.0,
+        scale_standard_error=0.01,
+        doubts=[],
+        reasons=[],
         indices=np.arange(3),
     )
     found = Instances([instance], surfsig.PointCloud(np.zeros((3, 3))), {})

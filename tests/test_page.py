@@ -28,6 +28,7 @@ def registration() -> Registration:
     return Registration(
         T_target_source=POSE,
         covariance=1e-4 * np.eye(6),
+        information=1e4 * np.eye(6),
         center=np.zeros(3),
         free_directions=[],
         matches=30,
@@ -70,7 +71,10 @@ def test_a_registration_s_page_moves_the_source(tmp_path: Path) -> None:
 def test_a_page_of_instances_shows_models_in_their_poses(tmp_path: Path) -> None:
     model = surfsig.PointCloud(RNG.uniform(size=(20, 3)))
     scene = surfsig.PointCloud(RNG.uniform(size=(30, 3)))
-    one = Instance("cup", POSE, np.eye(6), np.zeros(3), 0.5, 0.7, 0.4, 0.001, [], np.arange(10, 20))
+    numbers = np.arange(10, 20)
+    one = Instance(
+        "cup", POSE, np.eye(6), np.zeros(3), 0.5, 0.7, 0.4, 0.001, [], [], 1.0, 0.01, [], [], numbers
+    )
     found = Instances([one], scene, {"cup": model})
     found.write_report(tmp_path / "page.html")
     drawn, placed = report_of(tmp_path / "page.html")["layers"]

@@ -28,7 +28,7 @@ def edge(poses: np.ndarray, source: int, target: int, seed: int, noise: float = 
     about = geometry.from_translation(center)
     twist = noise * rng.normal(0.0, NOISE)
     measured = about @ geometry.exp_twist(-twist) @ geometry.inverse(about) @ exact
-    return Edge(source, target, measured, np.diag(NOISE**2), center, 1.0)
+    return Edge(source, target, measured, np.diag(NOISE**-2.0), center, 1.0)
 
 
 PAIRS = [(1, 0), (2, 1), (3, 2), (4, 3), (0, 4), (2, 0), (3, 1)]
@@ -59,7 +59,7 @@ def test_one_wrong_pair_hardly_moves_the_others() -> None:
     wrong = edge(poses, 3, 0, 6)
     shifted = wrong.T_target_source.copy()
     shifted[:3, 3] += 8.0
-    lighter = Edge(3, 0, shifted, wrong.covariance, wrong.center, 0.1)
+    lighter = Edge(3, 0, shifted, wrong.information, wrong.center, 0.1)
     found = solve(5, 0, [*edges, lighter])
     assert np.linalg.norm(found.T_world_scan[:, :3, 3] - poses[:, :3, 3], axis=1).max() < 0.5
     assert found.residuals[-1] > 20.0 * found.residuals[:-1].max()
@@ -84,3 +84,23 @@ def test_the_reference_changes_nothing_but_the_axes(first: int) -> None:
     other = solve(5, 4, edges).T_world_scan
     relative = [np.linalg.inv(each[1]) @ each[3] for each in (found, other)]
     assert np.abs(relative[0] - relative[1]).max() < 1e-5
+
+
+def test_a_motion_that_no_edge_determines_has_an_infinite_variance() -> None:
+    poses = truth(3, 8)
+    known = edge(poses, 1, 0, 9)
+    # Of the second edge the translation along z of the target is not known.
+    measured = edge(poses, 2, 1, 9)
+    open_along = measured.information.copy()
+    open_along[5, :] = open_along[:, 5] = 0.0
+    slides = Edge(2, 1, measured.T_target_source, open_along, measured.center, 1.0)
+    found = solve(3, 0, [known, slides])
+    assert np.isfinite(found.covariance[1]).all()
+    assert np.isinf(found.covariance[2][3:, 3:]).any()
+    along = geometry.inverse(poses[2])[:3, :3] @ poses[1][:3, 2]
+    open_part = np.isinf(np.diag(found.covariance[2])[3:])
+    np.testing.assert_array_equal(open_part, along**2 > 0.0025)
+    assert np.isfinite(found.covariance[2][:3, :3]).all()
+    # With another edge that knows it, nothing is open.
+    whole = solve(3, 0, [known, slides, edge(poses, 2, 0, 9)])
+    assert np.isfinite(whole.covariance).all()

@@ -153,6 +153,8 @@ class RegistrationSettings:
         rival_least_score: float | None = None,
         rival_distance: float | None = None,
         rival_push: float | None = None,
+        rival_nudge: float | None = None,
+        rival_nudge_deficit: float | None = None,
         rival_weak: float | None = None,
         rival_deficit: float | None = None,
         rival_deviations: float | None = None,
@@ -229,6 +231,12 @@ class RegistrationSettings:
     @property
     def rival_push(self) -> float:
         """Radii of a patch by which the source is pushed along motions that are weakly held."""
+    @property
+    def rival_nudge(self) -> float:
+        """Part of such a push that alone must leave the source on the surface."""
+    @property
+    def rival_nudge_deficit(self) -> float:
+        """What the source explains less then, as a share, to be held."""
     @property
     def rival_weak(self) -> float:
         """Distances from the surface over the points' paths, below which a motion is weakly held."""
@@ -699,7 +707,7 @@ class OdometrySettings:
         plane_steps: int | None = None,
         max_point_distance: float | None = None,
         max_residual: float | None = None,
-        min_observability: float | None = None,
+        rival_radius: float | None = None,
         map_range_factor: float | None = None,
         map_min_translation: float | None = None,
         map_min_rotation: float | None = None,
@@ -733,8 +741,8 @@ class OdometrySettings:
     def max_residual(self) -> float:
         """Largest point-to-plane residual of an inlier, in voxels."""
     @property
-    def min_observability(self) -> float:
-        """Least eigenvalue of the normal matrix for one correspondence with which a pose is observable."""
+    def rival_radius(self) -> float:
+        """Twice the length, in voxels, by which a scan is pushed along motions that are weakly determined."""
     @property
     def map_range_factor(self) -> float:
         """Range of the map over the distance within which 99 in 100 points of a scan are."""

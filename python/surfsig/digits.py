@@ -5,8 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+import numpy as np
+from numpy.typing import NDArray
+
 DIGITS = 15
 """That float64 holds."""
+
+
+def finite_rows(matrix: NDArray[np.float64]) -> list[list[float | None]]:
+    """Give a matrix row by row, for JSON: None for what is not finite."""
+    return [[value if math.isfinite(value) else None for value in row] for row in matrix.tolist()]
 
 
 def decimals_of(value: float, error: float) -> int:

@@ -593,9 +593,18 @@ typedef struct {
   surfsig_transform T_map_scan;
   /**
    * Of the twist m (rotation vector in radians, then translation) in the scan's own axes by which the pose is off,
-   * T_true = T_map_scan exp(m): 6 x 6, row by row. NaN where there is no pose.
+   * T_true = T_map_scan exp(m): 6 x 6, row by row. NaN where there is no pose; infinite in the entries of motions that
+   * nothing has determined since the first scan.
    */
   double covariance[36];
+  /**
+   * Number of motions that the map does not determine for this scan: along them the last motion goes on.
+   */
+  size_t free_direction_count;
+  /**
+   * These motions, in the scan's coordinates.
+   */
+  surfsig_free_direction free_directions[SURFSIG_FREE_DIRECTIONS];
 } surfsig_scan_pose;
 
 /**

@@ -3,7 +3,7 @@
 use crate::arrays::{array, present, put, put_new};
 use crate::code::{Failure, guarded, surfsig_code};
 use crate::options::thread_count;
-use crate::registration::surfsig_scan;
+use crate::registration::{SURFSIG_FREE_DIRECTIONS, surfsig_free_direction, surfsig_scan};
 use crate::transform::surfsig_transform;
 use std::ffi::{CStr, c_char};
 use surfsig::{Odometry, OdometrySettings, ScanPose, ScanStatus};
@@ -47,8 +47,13 @@ pub struct surfsig_scan_pose {
     /// Takes the scan's points to the map; NaN where there is no pose.
     pub T_map_scan: surfsig_transform,
     /// Of the twist m (rotation vector in radians, then translation) in the scan's own axes by which the pose is off,
-    /// T_true = T_map_scan exp(m): 6 x 6, row by row. NaN where there is no pose.
+    /// T_true = T_map_scan exp(m): 6 x 6, row by row. NaN where there is no pose; infinite in the entries of motions that
+    /// nothing has determined since the first scan.
     pub covariance: [f64; 36],
+    /// Number of motions that the map does not determine for this scan: along them the last motion goes on.
+    pub free_direction_count: usize,
+    /// These motions, in the scan's coordinates.
+    pub free_directions: [surfsig_free_direction; SURFSIG_FREE_DIRECTIONS],
 }
 
 impl surfsig_scan_pose {
@@ -60,6 +65,8 @@ impl surfsig_scan_pose {
             overlap: pose.overlap,
             T_map_scan: surfsig_transform::or_nan(pose.T_map_scan.as_ref()),
             covariance,
+            free_direction_count: pose.free_directions.len(),
+            free_directions: surfsig_free_direction::array_of(&pose.free_directions),
         }
     }
 }

@@ -164,6 +164,12 @@ fn to_python(py: Python<'_>, instance: Instance) -> PyResult<Bound<'_, PyDict>> 
     result.set_item("overlap", instance.overlap)?;
     result.set_item("rms", instance.rms)?;
     result.set_item("free_directions", free_directions_to_python(&instance.free_directions))?;
+    let alternatives: Vec<[[f64; 4]; 4]> = instance.alternatives.iter().map(|one| one.to_matrix()).collect();
+    result.set_item("alternatives", alternatives)?;
+    result.set_item("scale", instance.scale)?;
+    result.set_item("scale_standard_error", instance.scale_standard_error)?;
+    result.set_item("doubts", instance.doubts.iter().map(surfsig::Doubt::name).collect::<Vec<_>>())?;
+    result.set_item("reasons", instance.doubts.iter().map(ToString::to_string).collect::<Vec<_>>())?;
     let indices: Vec<i64> = instance.indices.into_iter().map(|index| index as i64).collect();
     result.set_item("indices", indices.into_pyarray(py))?;
     Ok(result)

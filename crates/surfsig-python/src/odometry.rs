@@ -1,6 +1,7 @@
 //! Odometry, for Python.
 
 use crate::extract::Points;
+use crate::registration::free_directions_to_python;
 use crate::settings::settings_class;
 use crate::to_python;
 use numpy::{IntoPyArray, PyArrayMethods};
@@ -25,8 +26,8 @@ settings_class! {
         max_point_distance: f64 = alignment.max_point_distance,
         /// Largest point-to-plane residual of an inlier, in voxels.
         max_residual: f64 = alignment.max_residual,
-        /// Least eigenvalue of the normal matrix for one correspondence with which a pose is observable.
-        min_observability: f64 = alignment.min_observability,
+        /// Twice the length, in voxels, by which a scan is pushed along motions that are weakly determined.
+        rival_radius: f64 = alignment.rival_radius,
         /// Range of the map over the distance within which 99 in 100 points of a scan are.
         map_range_factor: f64 = map.range_factor,
         /// Translation, in voxels, from which on the next scan goes into the map.
@@ -99,7 +100,8 @@ impl Odometry {
         self.odometry.voxel()
     }
 
-    /// Arrays with an entry for each scan: poses, covariances, status, overlaps.
+    /// Arrays with an entry for each scan: poses, covariances, status, overlaps; and a list of free
+    /// directions of each.
     fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = self.odometry.poses();
         let matrix = |pose: &surfsig::ScanPose| {
@@ -114,6 +116,9 @@ impl Odometry {
         arrays.set_item("covariances", covariances.into_pyarray(py).reshape([found.len(), 6, 6])?)?;
         arrays.set_item("status", status.into_pyarray(py))?;
         arrays.set_item("overlaps", overlaps.into_pyarray(py))?;
+        let free: Vec<_> =
+            found.iter().map(|pose| free_directions_to_python(&pose.free_directions)).collect();
+        arrays.set_item("free_directions", free)?;
         Ok(arrays)
     }
 }

@@ -65,6 +65,10 @@ settings_class! {
         rival_distance: f64 = rivals.distance,
         /// Radii of a patch by which the source is pushed along motions that are weakly held.
         rival_push: f64 = rivals.push,
+        /// Part of such a push that alone must leave the source on the surface.
+        rival_nudge: f64 = rivals.nudge,
+        /// What the source explains less then, as a share, to be held.
+        rival_nudge_deficit: f64 = rivals.nudge_deficit,
         /// Distances from the surface over the points' paths, below which a motion is weakly held.
         rival_weak: f64 = rivals.weak,
         /// What a rival explains less, as a share, at least, to be refuted.
@@ -136,6 +140,7 @@ pub fn register<'py>(
     result.set_item("T_target_source", matrix)?;
     result.set_item("covariance", found.covariance.as_flattened().to_pyarray(py).reshape([6, 6])?)?;
     result.set_item("center", found.center.to_pyarray(py))?;
+    result.set_item("information", found.information.as_flattened().to_pyarray(py).reshape([6, 6])?)?;
     result.set_item("free_directions", free_directions_to_python(&found.free_directions))?;
     result.set_item("matches", found.matches)?;
     result.set_item("inliers", found.inliers)?;

@@ -73,7 +73,7 @@ mod visibility;
 mod voxels;
 
 pub use alignment::{
-    Alternative, ConsensusSettings, FreeDirection, GicpCloud, GicpResult, GicpSettings,
+    Alternative, ConsensusSettings, Doubt, FreeDirection, GicpCloud, GicpResult, GicpSettings,
     PointToSurfaceSettings, RivalSettings, free_directions, gicp,
 };
 pub use cell_index::CellIndex;
@@ -113,9 +113,7 @@ pub use recurrences::{
     OrientedScan, PieceAlignment, PieceSituation, PieceView, PosesOfPair, RecurrenceSettings, align_pieces,
     judge_poses, refine_poses,
 };
-pub use registration::{
-    Doubt, FreeSpaceSettings, REGISTRATION_STEPS, Registration, RegistrationSettings, register,
-};
+pub use registration::{FreeSpaceSettings, REGISTRATION_STEPS, Registration, RegistrationSettings, register};
 pub use resolution::{COARSEST_STEP, RESOLUTION_SAMPLES, Resolution};
 pub use scan::Scan;
 pub use simd::InstructionSet;

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.cloud_transforms import transform_cloud
-from surfsig.digits import position_text, rounded
+from surfsig.digits import finite_rows, position_text, rounded
 from surfsig.page import NOTEBOOK_POINTS, Layer, notebook_html, page_html, write_page
 from surfsig.page.packing import MOST_POINTS
 from surfsig.point_cloud import PointCloud
@@ -50,15 +50,38 @@ class Instance:
     """Root mean square of the distances there, in the clouds' unit."""
     free_directions: list[FreeDirection]
     """Motions, in the scene's coordinates, in which what is seen does not hold the model."""
+    alternatives: list[Array]
+    """Other poses T_scene_model, (4, 4) each, that explain as much of what is seen, as of a box that looks
+    the same after half a turn."""
+    scale: float
+    """How many times as large as the model the instance is, by a similarity transform; NaN where what is seen
+    does not determine it. The pose itself is rigid."""
+    scale_standard_error: float
+    """Of `scale`."""
+    doubts: list[str]
+    """Names of the tests that the pose has not survived: free_directions, ambiguous, scale; empty where it is
+    trusted."""
+    reasons: list[str]
+    """The same in words."""
     indices: NDArray[np.int64]
     """Numbers of the scene's points that are the instance's, ascending."""
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the pose was tried to be refuted, and was not.
+
+        It is the only one that explains as much, all of it is determined, and the instance is as large as the
+        model.
+        """
+        return not self.doubts
 
     def __repr__(self) -> str:
         """Say what it is."""
         free = "".join(f", {direction}" for direction in self.free_directions)
+        why = "".join(f"; {reason}" for reason in self.reasons)
         return (
             f"Instance({self.name}: score {self.score:.2f}, {self.visible:.0%} visible, "
-            f"{len(self.indices)} points, rms {self.rms:.3g}{free})"
+            f"{len(self.indices)} points, rms {self.rms:.3g}{free}{why})"
         )
 
     def values(self) -> dict[str, Any]:
@@ -71,13 +94,18 @@ class Instance:
         return {
             "name": self.name,
             "T_scene_model": self.T_scene_model.tolist(),
-            "covariance": self.covariance.tolist(),
+            "covariance": finite_rows(self.covariance),
             "center": self.center.tolist(),
             "score": self.score,
             "visible": self.visible,
             "overlap": self.overlap,
             "rms": self.rms,
             "free_directions": [free.values() for free in self.free_directions],
+            "alternatives": [pose.tolist() for pose in self.alternatives],
+            "scale": self.scale if np.isfinite(self.scale) else None,
+            "scale_standard_error": self.scale_standard_error if np.isfinite(self.scale) else None,
+            "trusted": self.trusted,
+            "reasons": self.reasons,
             "points": len(self.indices),
         }
 

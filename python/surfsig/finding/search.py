@@ -108,6 +108,7 @@ def find_instances(
     for values in found:
         free = [free_direction(*direction) for direction in values.pop("free_directions")]
         name, indices = names[values.pop("model")], numbers[values.pop("indices")]
+        values["alternatives"] = [np.array(pose) for pose in values["alternatives"]]
         instances.append(Instance(name=name, free_directions=free, indices=indices, **values))
     if not instances:
         spacing = point_spacing(cloud.points)

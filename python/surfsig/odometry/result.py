@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from surfsig.alignment.free_directions import FreeDirection
 from surfsig.odometry.report import report_html
 from surfsig.page import write_page
 from surfsig.point_cloud import PointCloud
@@ -41,11 +42,16 @@ class Odometry:
     """T_world_scan, (n, 4, 4)."""
     covariances: Array
     """Of the twist m (rotation vector in radians, then translation) in the scan's own frame by which a pose
-    is off, (n, 6, 6): T_true = T_world_scan exp(m). It grows as the map goes on from the first scan."""
+    is off, (n, 6, 6): T_true = T_world_scan exp(m). It grows as the map goes on from the first scan. Entries
+    of motions that nothing has determined, since the first scan on, are infinite; the others are the limit
+    as that variance grows."""
     status: NDArray[np.uint8]
     """`ScanStatus` as a number, (n,)."""
     overlaps: Array
     """Share of the scan's points that lie on the map, (n,); 0 where there is no pose."""
+    free_directions: list[list[FreeDirection]]
+    """Of each scan the motions, in its own coordinates, that the map does not determine, as along a smooth
+    corridor: there the last motion goes on. Empty lists where there are none."""
     timestamps: Array
     """In seconds, (n,): from the recording, or the files' names where these are numbers; otherwise the scans'
     numbers."""

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from surfsig import _surfsig
 from surfsig._surfsig import OdometrySettings
+from surfsig.alignment.free_directions import free_direction
 from surfsig.arguments import positive_length, progress_callback, thread_count
 from surfsig.errors import InvalidInputError
 from surfsig.files.sequence import ScanSequence, TimedScan, open_scan_sequence, scan_or_empty
@@ -43,7 +44,9 @@ def estimate_odometry(
     Each scan is aligned with a map of the surroundings that earlier scans have seen, from the pose to which
     the last motion leads. Where it lies there worse than scans did of late, it is searched among keyframes by
     the signatures of its keypoints; a pose that is found so counts only if the map explains all of the scan,
-    or the next scans follow it. Nothing needs to be set, and the result is always the same.
+    or the next scans follow it. Where the map leaves a motion open, as along a smooth corridor, that is named
+    (`Odometry.free_directions`), its variance is infinite, and the last motion goes on in it. Nothing
+    needs to be set, and the result is always the same.
 
     Parameters
     ----------
@@ -120,8 +123,11 @@ def estimate_odometry(
             "returns are written; they are left out",
             stacklevel=2,
         )
+    arrays = odometry.arrays()
+    free = [[free_direction(*one) for one in every] for every in arrays.pop("free_directions")]
     return Odometry(
-        **odometry.arrays(),
+        **arrays,
+        free_directions=free,
         timestamps=np.array(timestamps, np.float64),
         voxel=np.nan if odometry.voxel is None else odometry.voxel,
     )

@@ -14,6 +14,7 @@ from surfsig import geometry
 from surfsig._surfsig import RegistrationSettings
 from surfsig.arguments import progress_callback
 from surfsig.cloud_transforms import transform_cloud
+from surfsig.digits import finite_rows
 from surfsig.errors import InvalidInputError
 from surfsig.files.joined import joined
 from surfsig.point_cloud import PointCloud
@@ -60,7 +61,8 @@ class MultiwayRegistration:
     """(n, 4, 4): a point p of scan i is at R p + t of the reference; NaN where a scan does not belong."""
     covariance: Array
     """(n, 6, 6), of the twist (rotation vector in radians, then translation) of each scan about its own
-    origin in its own axes; 0 for the reference, NaN where a scan does not belong."""
+    origin in its own axes; 0 for the reference, NaN where a scan does not belong, infinite in the entries of
+    motions that no pair determines."""
     pairs: list[RegisteredPair]
     """All that were tried."""
 
@@ -138,7 +140,7 @@ class MultiwayRegistration:
             {
                 "name": name,
                 "T_reference_scan": pose.tolist() if belongs else None,
-                "covariance": covariance.tolist() if belongs else None,
+                "covariance": finite_rows(covariance) if belongs else None,
             }
             for name, pose, covariance, belongs in zip(
                 self.names, self.T_reference_scan, self.covariance, self.belongs, strict=True
@@ -261,7 +263,7 @@ class _Graph:
     def _edge(self, number: int) -> Edge:
         source, target, result = self.found[number]
         return Edge(
-            source, target, result.T_target_source, result.covariance, result.center, result.explained
+            source, target, result.T_target_source, result.information, result.center, result.explained
         )
 
     def _reference(self, used: set[int]) -> int:

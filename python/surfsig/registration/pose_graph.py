@@ -15,7 +15,9 @@ from surfsig import geometry
 Array = NDArray[np.float64]
 
 _UNDETERMINED = 1e-9
-"""Of the largest eigenvalue of an information matrix, below which a direction says nothing."""
+"""Of the largest eigenvalue of the normal matrix of all poses, below which no edge says anything."""
+_NO_PART = 0.0025
+"""Part of such a motion that a component of a scan's twist has, squared, below which it has none."""
 _ROBUST = 3.0
 """Standard deviations beyond which a residual counts less than its square (`soft_l1`)."""
 
@@ -28,19 +30,20 @@ class Edge:
     target: int
     T_target_source: Array
     """(4, 4)."""
-    covariance: Array
-    """(6, 6), of the twist about `center` in the target's axes, rotation first."""
+    information: Array
+    """(6, 6), the inverse of the covariance of the twist about `center` in the target's axes, rotation
+    first; 0 along motions that are not determined."""
     center: Array
     """(3,), in the target's coordinates."""
     weight: float
     """How much speaks for it; the tree that poses begin with takes the heaviest edges."""
 
     def square_root_information(self) -> Array:
-        """Give W with W^T W the inverse of the covariance, in the directions that are determined."""
-        scale = np.sqrt(np.maximum(np.diag(self.covariance), np.finfo(float).tiny))
-        values, vectors = np.linalg.eigh(self.covariance / np.outer(scale, scale))
-        values = np.maximum(values, _UNDETERMINED * values.max())
-        return np.asarray((vectors / np.sqrt(values)).T / scale)
+        """Give W with W^T W the information, (6, 6)."""
+        scale = np.sqrt(np.maximum(np.diag(self.information), np.finfo(float).tiny))
+        values, vectors = np.linalg.eigh(self.information / np.outer(scale, scale))
+        # Along motions that are not determined rounding may be below 0.
+        return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))).T * scale)
 
     def twist(self, T_world_source: Array, T_world_target: Array) -> Array:
         """Give the twist, (6,), about `center`, from the measured pose to the one that two poses imply."""
@@ -57,7 +60,8 @@ class Solution:
     T_world_scan: Array
     """(n, 4, 4); NaN for scans that no edge joins to the first one."""
     covariance: Array
-    """(n, 6, 6), of the twist of each scan about its own origin, in its own axes; 0 for the first one."""
+    """(n, 6, 6), of the twist of each scan about its own origin, in its own axes; 0 for the first one.
+    Infinite in the entries of motions that no edge determines."""
     residuals: Array
     """(edges,), of each edge the root of its squared residual over its covariance, a sixth of it; NaN for an
     edge that is not joined to the first scan."""
@@ -133,10 +137,15 @@ def solve(count: int, first: int, edges: Sequence[Edge]) -> Solution:
     redundant = 6 * (len(used) - len(free))
     factor = 6.0 * float(np.nansum(residuals**2)) / redundant if redundant else 1.0
     jacobian = found.jac.toarray() if hasattr(found.jac, "toarray") else found.jac
-    inverse = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
+    values, vectors = np.linalg.eigh(jacobian.T @ jacobian)
+    is_open = values <= _UNDETERMINED * values.max()
+    kept = vectors[:, ~is_open]
+    inverse = (kept / values[~is_open]) @ kept.T
+    unknown = vectors[:, is_open] @ vectors[:, is_open].T
     for scan, start in column.items():
-        block = inverse[start : start + 6, start : start + 6]
-        covariance[scan] = max(1.0, factor) * block * np.outer(unit, unit)
+        own = np.s_[start : start + 6, start : start + 6]
+        block = max(1.0, factor) * inverse[own] * np.outer(unit, unit)
+        covariance[scan] = np.where(np.abs(unknown[own]) < _NO_PART, block, np.copysign(np.inf, unknown[own]))
     return Solution(poses, covariance, residuals)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfsig import cloud_transforms, geometry
 from surfsig.alignment.free_directions import FreeDirection
-from surfsig.digits import position_text
+from surfsig.digits import finite_rows, position_text
 from surfsig.page import Layer, page_html, write_page
 from surfsig.point_cloud import PointCloud, coordinate_array
 
@@ -45,7 +45,10 @@ class Registration:
     covariance: Array
     """(6, 6), of the small twist (rotation vector in radians, then translation) in the target's axes, about
     `center`, that takes the given transform to the true one: T_true = T(center) exp(twist) T(-center)
-    T_target_source, where T(c) is the translation by c. Large in the free directions."""
+    T_target_source, where T(c) is the translation by c. Infinite in the entries of free directions; the
+    others are the limit as that variance grows."""
+    information: Array
+    """(6, 6), the inverse of the covariance, which is 0 along free directions."""
     center: Array
     """Middle of what overlaps, (3,), in the target's coordinates."""
     free_directions: list[FreeDirection]
@@ -206,7 +209,8 @@ class Registration:
         known = bool(np.isfinite(self.T_target_source).all())
         return {
             "T_target_source": self.T_target_source.tolist() if known else None,
-            "covariance": self.covariance.tolist() if np.isfinite(self.covariance).all() else None,
+            "covariance": finite_rows(self.covariance) if known else None,
+            "information": self.information.tolist() if known else None,
             "center": self.center.tolist() if known else None,
             "free_directions": [free.values() for free in self.free_directions],
             "matches": self.matches,

@@ -18,11 +18,11 @@ from .acquisitions import RANDOM_TILT, Acquisition, Jitter, paper_acquisition, p
 from .ellipsoid import Ellipsoid
 from .height_field import HeightField
 from .machined_part import PART_SCANNER, part, part_scene
-from .places import block, corridor, forest, hall, pipes, plane, room, tunnel, upright_pose
+from .places import block, corridor, forest, hall, pipes, plane, room, storey, tunnel, upright_pose
 from .poses import UP, facing, pose, turn
 from .scanner import Scanner
 from .scene import Hits, Placed, Scene
-from .sensors import DepthCamera, Lidar, distorted, scan
+from .sensors import Calibration, DepthCamera, Lidar, bent_calibration, distorted, scan
 from .surfaces import Box, Cone, Cylinder, Plane, Rectangle, Sphere, Surface
 
 __all__ = [
@@ -31,6 +31,7 @@ __all__ = [
     "UP",
     "Acquisition",
     "Box",
+    "Calibration",
     "Cone",
     "Cylinder",
     "DepthCamera",
@@ -46,6 +47,7 @@ __all__ = [
     "Scene",
     "Sphere",
     "Surface",
+    "bent_calibration",
     "block",
     "corridor",
     "distorted",
@@ -62,6 +64,7 @@ __all__ = [
     "pose",
     "room",
     "scan",
+    "storey",
     "transform_points",
     "tunnel",
     "turn",

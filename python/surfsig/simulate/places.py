@@ -1,4 +1,4 @@
-"""Places to scan whose truth is known: rooms, corridors, tunnels, halls, pipes, forests, a plane.
+"""Places to scan whose truth is known: rooms, corridors, tunnels, halls, storeys, pipes, forests, a plane.
 
 Each is drawn by a seed. Lengths are in metres, z is up, the floor is at z = 0, and the middle of a place is
 at x = y = 0. Some deceive on purpose: a smooth corridor does not tell how far a sensor went, an empty room
@@ -196,6 +196,68 @@ def plane(size: float = 60.0) -> Scene:
     Scene
     """
     return Scene([_box((0.0, 0.0, -0.5 * _THICK), (size, size, _THICK))])
+
+
+def storey(
+    seed: int = 0,
+    *,
+    rooms: tuple[int, int] = (4, 2),
+    size: tuple[float, float, float] = (6.0, 5.0, 2.8),
+    opening: float = 2.4,
+    furniture: int = 6,
+) -> Scene:
+    """Build a storey of rooms in rows, each open to its neighbours.
+
+    Parameters
+    ----------
+    seed
+        Draws where the openings are, and the furniture.
+    rooms
+        Their number along x and y.
+    size
+        Of a room, along x, y and z.
+    opening
+        Width of the openings between rooms, from floor to ceiling: the wider, the more of a room is seen from
+        the next.
+    furniture
+        Things in each room.
+
+    Returns
+    -------
+    Scene
+        The middle of room (i, j) is at ((i - (n - 1) / 2) * size x, (j - (m - 1) / 2) * size y); things stand
+        at least 1.2 metres from it.
+    """
+    rng = np.random.default_rng([11, seed])
+    (n, m), (x, y, z) = rooms, size
+    placed = _shell(n * x, m * y, z)
+    for i in range(n):
+        for j in range(m):
+            middle = np.array([(i - 0.5 * (n - 1)) * x, (j - 0.5 * (m - 1)) * y, 0.0])
+            things = [_thing(rng, (0.42 * x, 0.42 * y)) for _ in range(furniture)]
+            placed += [thing.moved(pose(middle)) for thing in things]
+            for axis, is_last in ((0, i == n - 1), (1, j == m - 1)):
+                if not is_last:
+                    placed += _wall_with_opening(rng, middle, axis, size, opening)
+    return Scene(placed)
+
+
+def _wall_with_opening(
+    rng: np.random.Generator, middle: Array, axis: int, size: tuple[float, float, float], opening: float
+) -> list[Placed]:
+    """Build the wall at the far side of a room along x or y, in two parts."""
+    along = 1 - axis
+    length = size[along]
+    start = rng.uniform(0.1, 0.9) * (length - opening)
+    placed = []
+    for low, high in ((0.0, start), (start + opening, length)):
+        wall, at = np.zeros(3), middle.copy()
+        wall[axis], wall[along], wall[2] = _THICK, high - low, size[2]
+        at[axis] += 0.5 * size[axis]
+        at[along] += 0.5 * (low + high) - 0.5 * length
+        at[2] = 0.5 * size[2]
+        placed.append(_box(at.tolist(), wall.tolist()))
+    return placed
 
 
 def block(size: tuple[float, float, float] = (1.0, 0.7, 0.4)) -> Scene:

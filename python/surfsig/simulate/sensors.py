@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InvalidInputError
 from ..geometry import pose_array
 from ..point_cloud import PointCloud
 from .poses import Array
 from .scene import Scene
+
+_EDGE = 0.05
+"""Share of the range by which two neighbouring returns differ at an edge."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +44,17 @@ class Lidar:
     max_range: float = 100.0
     dropout: float = 0.0
 
-    def rays(self) -> Array:
-        """Give unit vectors in the sensor's axes, (lines * steps, 3), one line after the other."""
+    def rays(self, line_errors: ArrayLike = 0.0) -> Array:
+        """Give unit vectors in the sensor's axes, (lines * steps, 3), one line after the other.
+
+        Parameters
+        ----------
+        line_errors
+            Radians by which each laser looks higher than the even spread says, (lines,).
+        """
         low, high = np.radians(self.elevation)
         elevation, azimuth = np.meshgrid(
-            np.linspace(low, high, self.lines),
+            np.linspace(low, high, self.lines) + np.asarray(line_errors, np.float64),
             np.arange(self.steps) / self.steps * 2.0 * np.pi - np.pi,
             indexing="ij",
         )
@@ -91,8 +100,65 @@ class DepthCamera:
         return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
+@dataclass(frozen=True)
+class Calibration:
+    """What is wrong with a sensor in all of its scans, as it is with real ones.
+
+    Errors of this kind act alike over large parts of a scan and over many scans, so that the spread of
+    residuals does not show them.
+
+    Parameters
+    ----------
+    range_scale
+        Share by which all ranges are too long.
+    incidence
+        By how much a range is too long where the surface is seen at a grazing angle, in metres; it grows as
+        1 - cos of the angle between ray and normal.
+    line_angle
+        Standard deviation of the elevation of a lidar's lasers, in degrees: points are written along the
+        directions that the lasers should have.
+    mixed
+        Share of the returns next to an edge that lie somewhere between both surfaces.
+    seed
+        Draws the lasers' elevations: the same seed is the same sensor.
+    """
+
+    range_scale: float = 0.0
+    incidence: float = 0.0
+    line_angle: float = 0.0
+    mixed: float = 0.0
+    seed: int = 0
+
+    def line_errors(self, lines: int) -> Array:
+        """Give the errors of the elevation of each laser, (lines,), in radians."""
+        drawn = np.random.default_rng([41, self.seed]).normal(size=lines)
+        return np.asarray(np.radians(self.line_angle) * drawn)
+
+
+def bent_calibration(seed: int = 0) -> Calibration:
+    """Give a calibration as bad as those of real lidars.
+
+    Parameters
+    ----------
+    seed
+        Of the sensor.
+
+    Returns
+    -------
+    Calibration
+        Ranges too long by a thousandth, and by up to 1 cm at grazing incidence; lasers off by 0.05 degrees;
+        half of the returns at edges mixed.
+    """
+    return Calibration(range_scale=0.001, incidence=0.01, line_angle=0.05, mixed=0.5, seed=seed)
+
+
 def scan(
-    scene: Scene, sensor: Lidar | DepthCamera, pose: ArrayLike | None = None, *, seed: int = 0
+    scene: Scene,
+    sensor: Lidar | DepthCamera,
+    pose: ArrayLike | None = None,
+    *,
+    seed: int = 0,
+    calibration: Calibration | None = None,
 ) -> PointCloud:
     """Scan a scene from one place.
 
@@ -106,6 +172,8 @@ def scan(
         (4, 4), T_scene_sensor; the identity by default.
     seed
         Of noise and dropouts; the same seed gives the same scan.
+    calibration
+        What is wrong with the sensor; nothing by default.
 
     Returns
     -------
@@ -118,16 +186,41 @@ def scan(
         If the pose is none, or nothing is met.
     """
     T_scene_sensor = np.eye(4) if pose is None else pose_array(pose, "pose")
+    wrong = Calibration() if calibration is None else calibration
     rays = sensor.rays()
-    hits = scene.cast(np.broadcast_to(T_scene_sensor[:3, 3], rays.shape), rays @ T_scene_sensor[:3, :3].T)
+    is_lidar = isinstance(sensor, Lidar)
+    true_rays = sensor.rays(wrong.line_errors(sensor.lines)) if isinstance(sensor, Lidar) else rays
+    directions = true_rays @ T_scene_sensor[:3, :3].T
+    hits = scene.cast(np.broadcast_to(T_scene_sensor[:3, 3], rays.shape), directions)
     rng = np.random.default_rng([seed, len(rays)])
     noise, luck = rng.normal(size=len(rays)), rng.random(len(rays))
     met = (hits.t < sensor.max_range) & (luck >= sensor.dropout)
     if not met.any():
         raise InvalidInputError("the sensor meets nothing of the scene")
-    deviation = sensor.noise * (hits.t[met] ** 2 if isinstance(sensor, DepthCamera) else 1.0)
-    ranges = hits.t[met] + deviation * noise[met]
+    ranges = hits.t
+    if calibration is not None:
+        width = sensor.steps if isinstance(sensor, Lidar) else sensor.width
+        ranges = _mixed(ranges, hits.surface, width, wrong.mixed, rng)
+        cosine = np.abs(np.einsum("ni,ni->n", directions, hits.normals))
+        ranges = ranges * (1.0 + wrong.range_scale) + wrong.incidence * (1.0 - cosine)
+    deviation = sensor.noise * (1.0 if is_lidar else hits.t[met] ** 2)
+    ranges = ranges[met] + deviation * noise[met]
     return PointCloud((ranges[:, None] * rays[met]).astype(np.float32), viewpoint=np.zeros(3))
+
+
+def _mixed(
+    ranges: Array, surface: NDArray[np.int32], width: int, share: float, rng: np.random.Generator
+) -> Array:
+    """Mix a share of the returns with those of the next ray of the line, where another surface lies apart."""
+    rows, surfaces = ranges.reshape(-1, width), surface.reshape(-1, width)
+    following = np.roll(rows, -1, axis=1)
+    drawn, part = rng.random(rows.shape), rng.random(rows.shape)
+    with np.errstate(invalid="ignore"):
+        is_other = surfaces != np.roll(surfaces, -1, axis=1)
+        apart = is_other & (np.abs(following - rows) > _EDGE * np.minimum(rows, following))
+        is_mixed = apart & np.isfinite(rows) & np.isfinite(following) & (drawn < share)
+        mixed = np.where(is_mixed, rows + part * (following - rows), rows)
+    return np.asarray(mixed.reshape(-1))
 
 
 def distorted(cloud: PointCloud, *, scale: float = 1.0, mirrored: bool = False) -> PointCloud:

@@ -13,6 +13,10 @@ const LEAST_KNOWN: f64 = 0.75;
 /// as between its scan lines: such points speak neither for a transform nor against it.
 pub(crate) type Closeness = Vec<Option<f64>>;
 
+/// Instead of a closeness where the target's sensor cannot have seen the point: it speaks neither for a transform nor
+/// against it, but the transform does not lead off the target there.
+pub(crate) const HIDDEN: f64 = f64::NAN;
+
 /// What a transform explains of a source.
 #[derive(Debug, Clone)]
 pub(crate) struct Explained {
@@ -36,7 +40,7 @@ impl TargetSurface {
 
 /// The share of all points that is explained, 0 to 1.
 pub(crate) fn explained_share(closeness: &[Option<f64>]) -> f64 {
-    closeness.iter().flatten().sum::<f64>() / closeness.len().max(1) as f64
+    closeness.iter().flatten().filter(|share| !share.is_nan()).sum::<f64>() / closeness.len().max(1) as f64
 }
 
 impl Explained {
@@ -62,7 +66,8 @@ impl Explained {
         let count = block_count(&self.block);
         let (mut sums, mut whole) = (vec![0.0; count], 0.0);
         for ((mine, theirs), &block) in self.closeness.iter().zip(other).zip(&self.block) {
-            if let (Some(mine), Some(theirs)) = (mine, theirs) {
+            let (Some(mine), Some(theirs)) = (mine, theirs) else { continue };
+            if !mine.is_nan() && !theirs.is_nan() {
                 sums[block as usize] += mine - theirs;
                 whole += mine;
             }
@@ -113,6 +118,9 @@ mod tests {
         let best: Closeness = vec![Some(0.9); 64];
         let explained = Explained::new(best, &line());
         let some: Closeness = (0..64).map(|i| (i % 8 > 0).then_some(0.9)).collect();
+        let hidden: Closeness = (0..64).map(|i| Some(if i % 2 > 0 { 0.9 } else { HIDDEN })).collect();
+        assert_eq!(explained.deficit_of(&hidden).unwrap().0, 0.0);
+        assert!((explained_share(&hidden) - 0.45).abs() < 1e-12);
         let half: Closeness = (0..64).map(|i| (i % 2 > 0).then_some(0.9)).collect();
         assert_eq!(explained.deficit_of(&some).unwrap().0, 0.0);
         assert_eq!(explained.deficit_of(&half), None);

@@ -2,35 +2,46 @@
 //!
 //! Matches propose a transform ([`consensus`]), distributions refine it ([`gicp`]), points fit it to the surface
 //! ([`point_to_surface`]), many at once are fitted to tangent planes ([`point_to_plane`]), and [`observability`] tells in
-//! which directions nothing determines it. [`rivals`] are transforms that explain as much, and [`scale`] tells whether
-//! both surfaces are of one size.
+//! which directions nothing determines it, whose variance is infinite ([`open_covariance`]). [`rivals`] are transforms
+//! that explain as much, some of them proposed by [`symmetry`]; [`scale`] tells whether both surfaces are of one size;
+//! and [`halves`] of an overlap tell what blocks of neighbours cannot see.
 
 mod clustered_covariance;
 mod consensus;
+mod doubt;
 mod even_sample;
 mod explained;
 mod gicp;
 mod gicp_cloud;
+mod halves;
 mod least_squares;
 mod observability;
+mod open_covariance;
 mod point_to_plane;
 mod point_to_surface;
 mod rivals;
 mod scale;
+mod symmetry;
 
 pub(crate) use clustered_covariance::{blocks, clustered_covariance};
 pub use consensus::ConsensusSettings;
 pub(crate) use consensus::Correspondences;
+pub use doubt::Doubt;
 pub(crate) use even_sample::even_sample;
-pub(crate) use explained::Explained;
+pub(crate) use explained::Closeness;
 pub(crate) use gicp::gicp_with;
 pub use gicp::{GicpResult, GicpSettings, gicp};
 pub use gicp_cloud::GicpCloud;
 pub(crate) use gicp_cloud::{GicpTarget, plane_of};
+pub(crate) use halves::{halves, systematic_covariance};
 pub(crate) use least_squares::{LinearisedDistances, solve_determined};
 pub use observability::{FreeDirection, free_directions};
+pub(crate) use open_covariance::{
+    infinite_along, information_without, motions_beyond, orthonormal, unscaled,
+};
 pub(crate) use point_to_plane::{FACING_AWAY, OrientedSurface, cosine_towards, transformed};
 pub use point_to_surface::PointToSurfaceSettings;
-pub(crate) use point_to_surface::{PointToSurface, TargetSurface};
-pub(crate) use rivals::Rivals;
+pub(crate) use point_to_surface::{PointToSurface, SURROUNDING, TargetSurface, surface_goes_on};
 pub use rivals::{Alternative, RivalSettings};
+pub(crate) use rivals::{FittedSurface, FittedTarget, Rivals, ScaleLimits};
+pub(crate) use symmetry::symmetries;

@@ -58,6 +58,21 @@ impl FreeDirection {
             Self::RotationAboutPoint { point: p } => Self::RotationAboutPoint { point: point(p) },
         }
     }
+
+    /// Twists about `center`, rotation first: one, or three of all rotations about a point.
+    pub(crate) fn twists(&self, center: [f64; 3]) -> Vec<Vector6<f64>> {
+        let rotation = |axis: Vector3<f64>, point: [f64; 3]| {
+            let velocity = axis.cross(&(Vector3::from(center) - Vector3::from(point)));
+            Vector6::new(axis.x, axis.y, axis.z, velocity.x, velocity.y, velocity.z)
+        };
+        match *self {
+            Self::Translation { axis: [x, y, z] } => vec![Vector6::new(0.0, 0.0, 0.0, x, y, z)],
+            Self::Rotation { axis, point } => vec![rotation(axis.into(), point)],
+            Self::RotationAboutPoint { point } => {
+                [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| rotation(axis, point)).into()
+            }
+        }
+    }
 }
 
 /// The motions along which points with unit normals slide over their own surface; its rims do not count.

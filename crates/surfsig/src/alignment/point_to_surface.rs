@@ -1,6 +1,7 @@
 //! The last steps of a transform, by the distances of points from a surface; and how sure it then is.
 
 use super::clustered_covariance::{blocks, clustered_covariance};
+use super::halves::{halves, systematic_covariance};
 use super::least_squares::{LinearisedDistances, pseudo_inverse};
 use crate::geometry::RigidTransform;
 use crate::kd_tree::KdTree;
@@ -11,7 +12,7 @@ use rayon::prelude::*;
 /// Nearest points of the target that its surface is fitted to.
 const NEIGHBORS: usize = 20;
 /// Nearest points that show whether the surface through the first ones goes on around them.
-const SURROUNDING: usize = 60;
+pub(crate) const SURROUNDING: usize = 60;
 /// Largest sine of the angle between the surface and points around it that it passes through.
 const LARGEST_SLOPE: f64 = 0.5;
 /// Share of the points around that it must pass through.
@@ -273,7 +274,7 @@ impl TargetSurface {
 }
 
 /// Whether the plane through the nearest points, which come first, passes through the others, too.
-fn surface_goes_on(points: &[Vector3<f64>]) -> bool {
+pub(crate) fn surface_goes_on(points: &[Vector3<f64>]) -> bool {
     if points.len() <= NEIGHBORS {
         return true;
     }
@@ -332,7 +333,8 @@ impl System {
     fn result(self, transform: RigidTransform, inliers: &[Residual], of: usize) -> PointToSurface {
         let distances: Vec<f64> = inliers.iter().map(|one| one.distance).collect();
         let independent = self.independent_covariance(inliers);
-        let covariance = independent * self.alike(&distances, &independent);
+        let covariance =
+            independent * self.alike(&distances, &independent) + self.systematic(&distances, inliers);
         let unit =
             Matrix6::from_diagonal(&Vector6::from_fn(
                 |k, _| if k < 3 { 1.0 / self.linearised.unit } else { 1.0 },
@@ -371,6 +373,15 @@ impl System {
         let together = parts.iter().map(|part| part * part.transpose()).sum::<Matrix6<f64>>();
         let inverse = pseudo_inverse(self.linearised.information, ROUNDING);
         inverse * (self.linearised.information * of_source + together * of_target) * inverse
+    }
+
+    /// What halves of the overlap say beyond.
+    fn systematic(&self, distances: &[f64], inliers: &[Residual]) -> Matrix6<f64> {
+        let Some(block) = blocks(&self.points) else { return Matrix6::zeros() };
+        let about_center = |point: &[f64; 3]| (Vector3::from(*point) - self.linearised.center).into();
+        let points: Vec<[f64; 3]> = self.points.iter().map(about_center).collect();
+        let normals: Vec<[f64; 3]> = inliers.iter().map(|one| one.normal.into()).collect();
+        systematic_covariance(&self.linearised.design, distances, &halves(&points, &normals), &block)
     }
 
     /// How much more the sums over blocks of neighbours vary than those of independent errors, 1 at least.

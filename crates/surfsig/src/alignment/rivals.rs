@@ -1,10 +1,79 @@
 //! Whether another transform explains as much as the best one: proposed ones, and pushes along motions that little
 //! holds.
 
-use super::explained::{Closeness, Explained, explained_share};
+use super::doubt::Doubt;
+use super::explained::{Closeness, Explained, HIDDEN, explained_share};
 use super::observability::{FreeDirection, Motions, UNOBSERVABLE};
-use super::point_to_surface::{PointToSurface, PointToSurfaceSettings, TargetSurface};
+use super::point_to_surface::{PointToSurfaceSettings, TargetSurface};
+use super::scale::Scale;
 use crate::geometry::RigidTransform;
+
+/// A surface to which transforms are fitted anew, from starts that may be far off.
+pub(crate) trait FittedSurface: Sync {
+    /// The transform that a start leads to; `None` where the source hardly meets the surface.
+    fn fitted(&self, source: &[[f64; 3]], start: RigidTransform) -> Option<RigidTransform>;
+
+    /// How near points, in the surface's coordinates, lie to it.
+    fn closeness(&self, moved: &[[f64; 3]]) -> Closeness;
+}
+
+/// From when on a source counts as larger or smaller than the target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ScaleLimits {
+    /// Logarithm of the scale.
+    pub doubted: f64,
+    /// The same in its standard errors.
+    pub deviations: f64,
+}
+
+/// A target's surface with the distance up to which points count.
+pub(crate) struct FittedTarget<'a> {
+    pub surface: &'a TargetSurface,
+    /// Of inliers, at most.
+    pub farthest: f64,
+    /// How transforms that are far off are fitted.
+    pub fit: PointToSurfaceSettings,
+    /// Whether a point cannot have been seen from where the target was: what the target lacks there speaks neither for
+    /// a transform nor against it. An empty hall whose sensors are mirrored by a half turn is explained best by that.
+    pub is_hidden: &'a (dyn Fn([f64; 3]) -> bool + Sync),
+}
+
+impl FittedTarget<'_> {
+    /// The scale of points that a transform has brought near, and the doubt whether it is 1: where another one differs
+    /// from it significantly and explains more.
+    pub fn scale(
+        &self,
+        moved: &[[f64; 3]],
+        best: &Explained,
+        limits: ScaleLimits,
+    ) -> (Option<Scale>, Option<Doubt>) {
+        let Some(found) = self.surface.scale_of(moved, &self.fit) else { return (None, None) };
+        let Scale { scale, standard_error, .. } = found;
+        let off = scale.ln().abs();
+        let is_significant = off > limits.deviations * standard_error / scale && off > limits.doubted;
+        let explains_more =
+            || best.deficit_of(&self.closeness(&found.points)).is_some_and(|(deficit, _)| deficit < 0.0);
+        let doubt = (is_significant && explains_more()).then_some(Doubt::Scale { scale, standard_error });
+        (Some(found), doubt)
+    }
+}
+
+impl FittedSurface for FittedTarget<'_> {
+    fn fitted(&self, source: &[[f64; 3]], start: RigidTransform) -> Option<RigidTransform> {
+        Some(self.surface.align(source, start, &self.fit)?.T_target_source)
+    }
+
+    fn closeness(&self, moved: &[[f64; 3]]) -> Closeness {
+        let mut closeness = self.surface.closeness(moved, self.farthest, &self.fit);
+        for (one, point) in closeness.iter_mut().zip(moved) {
+            // What lies on the surface is seen, whatever the range image's pixels say.
+            if one.is_some_and(|share| share <= 0.0) && (self.is_hidden)(*point) {
+                *one = Some(HIDDEN);
+            }
+        }
+        closeness
+    }
+}
 
 /// When another transform explains as much; lengths are in radii of a patch. `benchmarks/trust.py --setting` shows what
 /// other values do in simulated places.
@@ -26,6 +95,12 @@ pub struct RivalSettings {
     /// How far the source is pushed along motions that are weakly held. With 0.15 the scan lines of a smooth corridor
     /// pull it back where nothing else holds it (3 of 6 corridors are seen to be free), with 0.6 they do not (6 of 6).
     pub push: f64,
+    /// Part of such a push that alone, without a fit, must leave the source on the surface where a motion is free: a
+    /// large one may take the few points that hold it to another surface.
+    pub nudge: f64,
+    /// What the source explains less then, as a share, to be held: in smooth corridors, tunnels and on planes it loses
+    /// nothing but noise, and shallow niches are a few in a hundred of a corridor's points.
+    pub nudge_deficit: f64,
     /// The root mean square of the distances from the surface over the points' paths, below which a motion is weakly
     /// held.
     pub weak: f64,
@@ -43,6 +118,8 @@ impl Default for RivalSettings {
             least_score: 0.1,
             distance: 1.0,
             push: 0.5,
+            nudge: 0.33,
+            nudge_deficit: 0.01,
             weak: 0.25,
             deficit: 0.03,
             deviations: 3.0,
@@ -69,77 +146,103 @@ pub struct Alternative {
 }
 
 /// A surface, a source, and the best transform.
-pub(crate) struct Rivals<'a> {
-    pub surface: &'a TargetSurface,
+#[allow(non_snake_case)]
+pub(crate) struct Rivals<'a, S> {
+    pub surface: S,
     /// Some of the source's points.
     pub source: &'a [[f64; 3]],
-    pub best: &'a PointToSurface,
+    /// The best transform.
+    pub T_target_source: RigidTransform,
     /// Of the patches.
     pub radius: f64,
     pub settings: RivalSettings,
-    /// How transforms that are far off are fitted to the surface.
-    pub fit: PointToSurfaceSettings,
 }
 
-impl Rivals<'_> {
+impl<S: FittedSurface> Rivals<'_, S> {
     /// What the best transform explains.
     pub fn explained(&self) -> Explained {
-        Explained::new(self.closeness(&self.best.T_target_source), self.source)
+        Explained::new(self.closeness(&self.T_target_source), self.source)
     }
 
     fn closeness(&self, transform: &RigidTransform) -> Closeness {
-        self.closeness_of(&transform.transform_points(self.source))
+        self.surface.closeness(&transform.transform_points(self.source))
     }
 
-    /// Of points in the target.
-    pub fn closeness_of(&self, moved: &[[f64; 3]]) -> Closeness {
-        self.surface.closeness(moved, self.best.farthest, &self.fit)
-    }
-
-    /// The transform that a start leads to, and the share that it explains, if that is as much as the best one does.
-    fn as_good(&self, explained: &Explained, start: RigidTransform) -> Option<(RigidTransform, f64)> {
-        let found = self.surface.align(self.source, start, &self.fit)?.T_target_source;
+    /// The transform that a start leads to, and the share that it explains, if that is as much as the best one does, but
+    /// for a deficit that depends on the transform.
+    fn as_good(
+        &self,
+        explained: &Explained,
+        start: RigidTransform,
+        deficit: impl Fn(&RigidTransform) -> f64,
+    ) -> Option<(RigidTransform, f64)> {
+        let found = self.surface.fitted(self.source, start)?;
         let closeness = self.closeness(&found);
-        let (deficit, error) = explained.deficit_of(&closeness)?;
-        let is_refuted = deficit > self.settings.deficit && deficit > self.settings.deviations * error;
+        let is_refuted = self.is_refuted(explained, &closeness, deficit(&found));
         (!is_refuted).then(|| (found, explained_share(&closeness)))
     }
 
-    /// Those of proposed transforms that explain as much and lead elsewhere.
+    /// Those of proposed transforms that explain as much and lead elsewhere; `deficit` is the share of what the best one
+    /// explains that each may lack.
     pub fn as_good_as_the_best(
         &self,
         explained: &Explained,
         proposed: &[RigidTransform],
+        deficit: impl Fn(&RigidTransform) -> f64,
     ) -> Vec<(RigidTransform, f64)> {
         let mut found: Vec<(RigidTransform, f64)> = Vec::new();
         for start in proposed {
-            let Some((transform, share)) = self.as_good(explained, *start) else { continue };
+            let Some((transform, share)) = self.as_good(explained, *start, &deficit) else { continue };
             let is_elsewhere = |other: &RigidTransform| {
                 self.displacement(&transform, other) > self.settings.distance * self.radius
             };
             let others = found.iter().map(|(other, _)| other);
-            if others.chain([&self.best.T_target_source]).all(is_elsewhere) {
+            if others.chain([&self.T_target_source]).all(is_elsewhere) {
                 found.push((transform, share));
             }
         }
         found
     }
 
-    /// Motions that the overlap does not determine: along some the surface slides over itself, along others it does
-    /// not come back when it is pushed, and explains as much.
-    pub fn free_directions(&self, explained: &Explained) -> Vec<FreeDirection> {
-        let motions = Motions::new(&self.best.points, &self.best.normals);
+    /// Motions that inliers, of which points and normals are given in the target, do not determine: along some the
+    /// surface slides over itself, along others it does not come back when it is pushed, and explains as much.
+    pub fn free_directions(
+        &self,
+        explained: &Explained,
+        points: &[[f64; 3]],
+        normals: &[[f64; 3]],
+    ) -> Vec<FreeDirection> {
+        let motions = Motions::new(points, normals);
         let length = self.settings.push * self.radius;
         motions.named(|sliding, number| {
             sliding <= UNOBSERVABLE
-                || sliding <= self.settings.weak
-                    && [length, -length].into_iter().any(|length| {
-                        let start = motions.along(number, length) * self.best.T_target_source;
-                        self.as_good(explained, start).is_some_and(|(transform, _)| {
-                            self.displacement(&transform, &self.best.T_target_source) > 0.5 * length.abs()
-                        })
-                    })
+                || sliding <= self.settings.weak && {
+                    let pushed = |length: f64| motions.along(number, length) * self.T_target_source;
+                    let nudge = self.settings.nudge * length;
+                    let slides = |length: f64| {
+                        !self.is_refuted(
+                            explained,
+                            &self.closeness(&pushed(length)),
+                            self.settings.nudge_deficit,
+                        )
+                    };
+                    let stays_away = |length: f64| {
+                        self.as_good(explained, pushed(length), |_| self.settings.deficit).is_some_and(
+                            |(transform, _)| {
+                                self.displacement(&transform, &self.T_target_source) > 0.5 * length.abs()
+                            },
+                        )
+                    };
+                    [nudge, -nudge].into_iter().all(slides) && [length, -length].into_iter().any(stays_away)
+                }
         })
+    }
+
+    /// Whether so much less is explained that it is no chance; also where much less of the surface is met.
+    fn is_refuted(&self, explained: &Explained, closeness: &Closeness, allowed: f64) -> bool {
+        explained
+            .deficit_of(closeness)
+            .is_none_or(|(deficit, error)| deficit > allowed && deficit > self.settings.deviations * error)
     }
 
     fn displacement(&self, one: &RigidTransform, other: &RigidTransform) -> f64 {

@@ -1,10 +1,11 @@
 //! Which candidates are instances: the best one takes its part of the scene away from the others, and so on.
 
 use super::evidence::{Evidence, ModelView};
+use super::examination::{Examined, Refined};
 use super::model::Model;
 use super::scene::{Scene, SceneSurface};
 use super::{FindSettings, Instance};
-use crate::alignment::{PointToSurface, TargetSurface, even_sample, free_directions};
+use crate::alignment::{FreeDirection, TargetSurface, even_sample, infinite_along};
 use crate::geometry::RigidTransform;
 use crate::kd_tree::KdTree;
 use crate::{Error, Monitor};
@@ -16,8 +17,8 @@ use std::sync::Arc;
 pub(super) struct Sought<'a> {
     /// The model's number.
     number: usize,
-    model: Model,
-    view: ModelView<'a>,
+    pub model: Model,
+    pub view: ModelView<'a>,
     tree: KdTree,
     extent: f64,
 }
@@ -58,7 +59,7 @@ impl Candidate<'_> {
             .collect()
     }
 
-    fn judged(&self, is_free: &[bool]) -> Evidence {
+    pub fn judged(&self, is_free: &[bool]) -> Evidence {
         self.sought.view.judged(&[self.T_scene_model], is_free)[0]
     }
 }
@@ -117,16 +118,18 @@ pub(super) fn accepted(
         });
         let Some(best) = best else { break };
         let candidate = candidates.remove(best);
-        let Some((fitted, fit)) = refined(&candidate, scene, &is_taken, settings) else { continue };
-        let evidence = fitted.judged(unexplained.of(&fitted));
+        let Some(refined) = refined(&candidate, scene, &is_taken, settings) else { continue };
+        let fitted = &refined.candidate;
+        let evidence = fitted.judged(unexplained.of(fitted));
         if evidence.score < settings.min_score {
             continue;
         }
+        let examined = refined.examined(evidence.score, unexplained.of(fitted), settings);
         let own = fitted.near(scene.scan.points.par_iter().copied(), settings.own_distance);
         let own: Vec<usize> = own.into_iter().filter(|&number| !is_taken[number]).collect();
         own.iter().for_each(|&number| is_taken[number] = true);
-        unexplained.take(&fitted, settings.own_distance);
-        instances.push(instance(&fitted, &fit, evidence, own, scene, models));
+        unexplained.take(fitted, settings.own_distance);
+        instances.push(instance(&refined, examined, evidence, own, scene, models));
         // Only those near it have lost something.
         let middle = fitted.T_scene_model.translation;
         for other in &mut candidates {
@@ -147,7 +150,7 @@ fn refined<'a>(
     scene: &Scene<'_>,
     is_taken: &[bool],
     settings: &FindSettings,
-) -> Option<(Candidate<'a>, PointToSurface)> {
+) -> Option<Refined<'a>> {
     let voxel = candidate.sought.view.scene.voxel;
     let points = &scene.scan.points;
     let near = candidate.near(points.par_iter().copied(), settings.own_distance);
@@ -158,36 +161,51 @@ fn refined<'a>(
     // The model's surface is the target: it is whole, and denser than what is seen.
     let fit = surface.align(&sample, candidate.T_scene_model.inverse(), &settings.point_to_surface)?;
     let fitted = Candidate { T_scene_model: fit.T_target_source.inverse(), ..candidate.clone() };
-    Some((fitted, fit))
+    Some(Refined { candidate: fitted, fit, surface, sample })
 }
 
 fn instance(
-    fitted: &Candidate<'_>,
-    fit: &PointToSurface,
+    refined: &Refined<'_>,
+    examined: Examined,
     evidence: Evidence,
     own: Vec<usize>,
     scene: &Scene<'_>,
     models: &[&Model],
 ) -> Instance {
+    let Refined { candidate: fitted, fit, .. } = refined;
     let translated = |by: [f64; 3]| RigidTransform::from_rotation_vector([0.0; 3], by);
-    let to_scene = translated(scene.scan.center) * fitted.T_scene_model;
+    let from_middle = translated(scene.scan.center);
+    let from_model = translated(models[fitted.sought.number].center).inverse();
+    let to_scene = from_middle * fitted.T_scene_model;
     // A small motion of the scene in the model's axes is the opposite one of the model in the scene's.
     let rotation = fitted.T_scene_model.rotation;
     let mut both = Matrix6::zeros();
     both.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
     both.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
-    let free = free_directions(&fit.points, &fit.normals);
+    let covariance = both * fit.covariance * both.transpose();
+    let free_directions: Vec<FreeDirection> =
+        examined.free_directions.iter().map(|direction| direction.transformed(&to_scene)).collect();
+    let center = to_scene.transform_point(fit.center);
+    let open: Vec<_> = free_directions.iter().flat_map(|direction| direction.twists(center)).collect();
     Instance {
         model: fitted.sought.number,
-        T_scene_model: to_scene * translated(models[fitted.sought.number].center).inverse(),
-        covariance: (both * fit.covariance * both.transpose()).into(),
-        center: to_scene.transform_point(fit.center),
+        T_scene_model: to_scene * from_model,
+        covariance: infinite_along(&covariance, &open, fitted.sought.model.places.radius).into(),
+        alternatives: examined
+            .alternatives
+            .iter()
+            .map(|transform| from_middle * *transform * from_model)
+            .collect(),
+        scale: examined.scale,
+        scale_standard_error: examined.scale_standard_error,
+        doubts: examined.doubts,
+        center,
         // Of a scene that several sensors saw more may be confirmed than one can see at once.
         score: evidence.score.min(1.0),
         visible: evidence.visible,
         overlap: evidence.overlap,
         rms: fit.rms,
-        free_directions: free.iter().map(|direction| direction.transformed(&to_scene)).collect(),
+        free_directions,
         indices: own.into_iter().map(|number| scene.scan.numbers[number]).collect(),
     }
 }

@@ -2,10 +2,12 @@
 //!
 //! Each place of the scene proposes a transform by the place of a model that it is most similar to ([`proposals`]).
 //! Those that many agree on are fitted to the scene's surface and judged by what the sensor saw ([`evidence`],
-//! [`rim`]); the best ones become instances, each of which takes its points away from the others ([`acceptance`]).
+//! [`rim`]); the best ones become instances, each of which takes its points away from the others ([`acceptance`]) and is
+//! tried to be refuted ([`examination`]).
 
 mod acceptance;
 mod evidence;
+mod examination;
 mod model;
 mod proposals;
 mod result;

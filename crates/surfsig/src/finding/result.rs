@@ -1,6 +1,6 @@
 //! What [`crate::find_instances`] gives.
 
-use crate::alignment::FreeDirection;
+use crate::alignment::{Doubt, FreeDirection};
 use crate::geometry::RigidTransform;
 
 /// A model that is in a scene.
@@ -20,7 +20,8 @@ pub struct Instance {
     /// Takes the model's points, in the coordinates in which it came, to the scene.
     pub T_scene_model: RigidTransform,
     /// Of the small twist (rotation vector in radians, then translation) in the scene's axes, about `center`, that takes
-    /// the given transform to the true one.
+    /// the given transform to the true one. Infinite in the entries of free directions; the others are the limit as that
+    /// variance grows.
     pub covariance: [[f64; 6]; 6],
     /// Middle of what lies on the scene's points, in the scene's coordinates.
     pub center: [f64; 3],
@@ -35,6 +36,17 @@ pub struct Instance {
     pub rms: f64,
     /// Motions, in the scene's coordinates, that what is seen does not determine.
     pub free_directions: Vec<FreeDirection>,
+    /// Other transforms (T_scene_model) that explain as much of what is seen, as of a box that looks the same after half a
+    /// turn: the symmetries of the model that no sensor's view refutes.
+    pub alternatives: Vec<RigidTransform>,
+    /// How many times as large as the model the instance is, by a similarity transform fitted to the surface; NaN where
+    /// what is seen does not determine it. The transform itself is rigid.
+    pub scale: f64,
+    /// Of `scale`.
+    pub scale_standard_error: f64,
+    /// Why the transform is not the only right one, or not right: free directions, alternatives, another size. Empty
+    /// where it is trusted.
+    pub doubts: Vec<Doubt>,
     /// Numbers of the scene's points that are the instance's, ascending.
     pub indices: Vec<usize>,
 }

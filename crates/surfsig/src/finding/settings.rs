@@ -1,6 +1,6 @@
 //! How instances are searched and judged.
 
-use crate::alignment::PointToSurfaceSettings;
+use crate::alignment::{PointToSurfaceSettings, RivalSettings};
 
 /// What an expert may change; nothing has to be set. Lengths in voxels are in those of the scene's surface.
 /// `benchmarks/sweep_settings.py` shows what other values give on simulated scenes.
@@ -68,6 +68,16 @@ pub struct FindSettings {
     /// Mean agreement in residual and normal, of 1, that another shape reaches where it touches by chance (0.4 to 0.6),
     /// and that equal surfaces reach (0.76 to 0.97, on simulated and real scans).
     pub agreement_by_chance: [f64; 2],
+    /// When another transform explains as much of an instance's points.
+    pub rivals: RivalSettings,
+    /// Distance from the model, in radii of a patch, from which rivals are fitted: as in registration.
+    pub rival_distance: f64,
+    /// Share of the score that a rival may lack: halves of a symmetric model differ by that in noise.
+    pub rival_deficit: f64,
+    /// The logarithm of a scale from which on it is doubted, as in registration.
+    pub doubted_scale: f64,
+    /// The same in its standard errors.
+    pub scale_deviations: f64,
     /// Number of threads; all cores where it is `None`. The result is the same, bit for bit.
     pub threads: Option<usize>,
 }
@@ -105,6 +115,11 @@ impl Default for FindSettings {
             round_spread: 0.1,
             touching_distance: 1.0,
             agreement_by_chance: [0.5, 0.75],
+            rivals: RivalSettings::default(),
+            rival_distance: 0.55,
+            rival_deficit: 0.15,
+            doubted_scale: 0.005,
+            scale_deviations: 4.0,
             threads: None,
         }
     }

@@ -33,10 +33,10 @@ impl Expectation {
         }
     }
 
-    /// Whether the pose is observable, and the scan lies on the map as scans do and contradicts nothing.
+    /// Whether the scan lies on the map as scans do and contradicts nothing.
     pub fn is_met(&self, found: &ScanAlignment) -> bool {
         let enough = found.overlap >= self.settings.doubted_overlap * self.overlap();
-        found.observable && enough && !self.is_contradicted(found)
+        enough && !self.is_contradicted(found)
     }
 
     /// Whether scan and map cannot both be, by what either sensor would have measured.
@@ -45,18 +45,18 @@ impl Expectation {
             || found.free_space > self.free_space() + self.settings.free_space_excess
     }
 
-    /// Whether a scan alone says that its pose is right: the map explains all of it.
+    /// Whether a scan alone says that its pose is right: the map explains all of it, and determines it.
     pub fn is_certain(&self, found: &ScanAlignment) -> bool {
         let full = found.overlap >= self.settings.certain_overlap * self.overlap();
         let explained = found.unexplained <= self.settings.certain_unexplained;
-        found.observable && full && explained && !self.is_contradicted(found)
+        found.free_directions.is_empty() && full && explained && !self.is_contradicted(found)
     }
 
     /// Whether a new room, or something that moves, may be all that is unexpected.
     pub fn may_be_new(&self, found: &ScanAlignment) -> bool {
         let departed = found.free_space <= self.free_space() + self.settings.departed_excess;
         let arrived = found.unexplained <= self.largest_unexplained() + self.settings.arrived_excess;
-        found.observable && departed && arrived
+        departed && arrived
     }
 
     fn overlap(&self) -> f64 {
@@ -76,7 +76,7 @@ impl Expectation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::RigidTransform;
+    use crate::{FreeDirection, RigidTransform};
     use nalgebra::Matrix6;
 
     fn lying(overlap: f64, free_space: f64, unexplained: f64) -> ScanAlignment {
@@ -86,7 +86,8 @@ mod tests {
             overlap,
             free_space,
             unexplained,
-            observable: true,
+            systematic: Matrix6::zeros(),
+            free_directions: Vec::new(),
             scans: Vec::new(),
         }
     }
@@ -104,7 +105,9 @@ mod tests {
         assert!(!expectation.is_met(&lying(0.67, 0.0, 0.0)));
         assert!(!expectation.is_met(&lying(0.8, 0.031, 0.0)));
         assert!(!expectation.is_met(&lying(0.8, 0.0, 0.046)));
-        assert!(!expectation.is_met(&ScanAlignment { observable: false, ..lying(0.8, 0.0, 0.0) }));
+        let free_directions = vec![FreeDirection::Translation { axis: [1.0, 0.0, 0.0] }];
+        let slides = ScanAlignment { free_directions, ..lying(0.8, 0.0, 0.0) };
+        assert!(expectation.is_met(&slides) && !expectation.is_certain(&slides));
         assert!(expectation.is_certain(&lying(0.75, 0.0, 0.019)));
         assert!(!expectation.is_certain(&lying(0.74, 0.0, 0.0)));
         assert!(!expectation.is_certain(&lying(0.8, 0.0, 0.021)));

@@ -2,7 +2,8 @@
 
 use super::settings::MapSettings;
 use super::voxel_index::{Nearest, VoxelIndex, squared_distance};
-use crate::alignment::{GicpTarget, plane_of};
+use crate::alignment::{GicpTarget, SURROUNDING, plane_of, surface_goes_on};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -57,6 +58,15 @@ impl LocalMap {
     /// The unit normal of a point, of which the side is open; `None` where its neighbours are on no plane.
     pub fn normal(&self, number: u32) -> Option<[f64; 3]> {
         Some(self.normals[number as usize]).filter(|normal| *normal != [0.0; 3])
+    }
+
+    /// Whether the surface around a point goes on beyond its nearest neighbours: those may all lie on one scan line,
+    /// which in a corner lies in a plane of its own that is none of the scene's.
+    pub fn goes_on(&self, number: u32, found: &mut Vec<(f64, u32)>) -> bool {
+        self.index.nearest_k(&self.points, self.points[number as usize], SURROUNDING, found);
+        let around: Vec<Vector3<f64>> =
+            found.iter().map(|(_, index)| self.points[*index as usize].into()).collect();
+        surface_goes_on(&around)
     }
 
     pub fn scans(&self) -> &[u32] {

@@ -2,12 +2,15 @@
 //!
 //! A scan is thinned ([`thinned_scan`]) by lengths of the first one ([`scale`]), expected where the last motion leads, and
 //! aligned ([`scan_alignment`]) with the map of the surroundings ([`local_map`]). Where it lies there worse than scans
-//! did of late ([`expectation`]), it is searched among keyframes ([`keyframes`]). [`tracker`] goes from scan to scan.
+//! did of late ([`expectation`]), it is searched among keyframes ([`keyframes`]). Along motions that the map
+//! ([`map_surface`]) does not determine, as along a smooth corridor, the last motion goes on. [`tracker`] goes from scan
+//! to scan.
 
 mod correspondences;
 mod expectation;
 mod keyframes;
 mod local_map;
+mod map_surface;
 mod result;
 mod scale;
 mod scan_alignment;
@@ -22,11 +25,12 @@ pub use settings::{
     ScaleSettings, ScanAlignmentSettings,
 };
 
+use crate::alignment::{FreeDirection, infinite_along, motions_beyond};
 use crate::{Error, RigidTransform, Scan, with_threads};
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 use scale::Scale;
 use thinned_scan::{SensorPosition, ThinnedScan};
-use tracker::{Step, Tracker};
+use tracker::{LEAST_OPEN, Step, Tracker};
 
 /// Voxels from the sensor beyond which no point is measured; they are numbered with 32 bits.
 const FARTHEST: f64 = 1e9;
@@ -171,13 +175,9 @@ impl Odometry {
         let mut changed = Vec::new();
         for step in tracked.tracker.follow(&scan) {
             let index = tracked.first + step.number;
-            self.poses[index] = in_frames(
-                &step,
-                index,
-                self.sensors[index],
-                self.sensors[tracked.first],
-                tracked.scale.voxel,
-            );
+            let sensors = [self.sensors[index], self.sensors[tracked.first]];
+            self.poses[index] =
+                in_frames(&step, index, sensors, tracked.scale.voxel, tracked.scale.median_range);
             changed.push(index);
         }
         if changed.last() != Some(&number) {
@@ -188,19 +188,36 @@ impl Odometry {
 }
 
 /// From voxels about the sensor to the scan's own unit and frame, and to the map's: the frame of the first scan.
-fn in_frames(step: &Step, scan: usize, sensor: [f64; 3], first_sensor: [f64; 3], voxel: f64) -> ScanPose {
+/// `sensors` are the scan's and the first one's; `unit` is the length by which a rotation moves points.
+fn in_frames(step: &Step, scan: usize, sensors: [[f64; 3]; 2], voxel: f64, unit: f64) -> ScanPose {
     let to = |translation: [f64; 3]| RigidTransform::from_rotation_vector([0.0; 3], translation);
     let mut pose = step.T_map_scan;
     pose.translation *= voxel;
-    let from_sensor = to(sensor);
+    let from_sensor = to(sensors[0]);
     // A twist about the sensor, in voxels, as one in the scan's frame.
     let adjoint = from_sensor.adjoint();
     let carried = Matrix6::from_fn(|i, j| adjoint[i][j] * if j < 3 { 1.0 } else { voxel });
-    let covariance = carried * step.covariance * carried.transpose();
+    let both = step.covariance.random + step.covariance.systematic;
+    let open: Vec<Vector6<f64>> = motions_beyond(&step.covariance.open, LEAST_OPEN, unit / voxel)
+        .iter()
+        .map(|motion| carried * motion)
+        .collect();
+    let covariance = infinite_along(&(carried * both * carried.transpose()), &open, unit);
+    let in_unit = |direction: &FreeDirection| match *direction {
+        FreeDirection::Translation { axis } => FreeDirection::Translation { axis },
+        FreeDirection::Rotation { axis, point } => {
+            FreeDirection::Rotation { axis, point: point.map(|c| c * voxel) }
+        }
+        FreeDirection::RotationAboutPoint { point } => {
+            FreeDirection::RotationAboutPoint { point: point.map(|c| c * voxel) }
+        }
+    };
+    let free = step.free_directions.iter().map(|direction| in_unit(direction).transformed(&from_sensor));
     ScanPose {
         scan,
-        T_map_scan: Some(to(first_sensor) * pose * from_sensor.inverse()),
+        T_map_scan: Some(to(sensors[1]) * pose * from_sensor.inverse()),
         covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
+        free_directions: free.collect(),
         status: step.status,
         overlap: step.overlap,
     }

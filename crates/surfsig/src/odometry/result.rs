@@ -1,6 +1,7 @@
 //! What odometry gives for each scan.
 
 use crate::RigidTransform;
+use crate::alignment::FreeDirection;
 
 /// Why a scan has the pose that it has.
 ///
@@ -55,8 +56,13 @@ pub struct ScanPose {
     /// Takes the scan's points to the map; `None` where the scan has no pose.
     pub T_map_scan: Option<RigidTransform>,
     /// Of the twist m (rotation vector in radians, then translation) in the scan's own axes by which the pose is off:
-    /// T_true = T_map_scan exp(m). It grows as the map goes on from the first scan. NaN where there is no pose.
+    /// T_true = T_map_scan exp(m). It grows as the map goes on from the first scan. NaN where there is no pose; infinite
+    /// in the entries of motions that nothing has determined, since the first scan on: the others are the limit as that
+    /// variance grows.
     pub covariance: [[f64; 6]; 6],
+    /// Motions, in the scan's coordinates, that the map does not determine for this scan, as along a smooth corridor:
+    /// there the last motion goes on. Empty where there are none.
+    pub free_directions: Vec<FreeDirection>,
     /// Why the pose is what it is.
     pub status: ScanStatus,
     /// Share of the scan's points that lie on the map; 0 where there is no pose.
@@ -66,6 +72,13 @@ pub struct ScanPose {
 impl ScanPose {
     /// A scan without a pose.
     pub(super) fn none(scan: usize, status: ScanStatus) -> Self {
-        Self { scan, T_map_scan: None, covariance: [[f64::NAN; 6]; 6], status, overlap: 0.0 }
+        Self {
+            scan,
+            T_map_scan: None,
+            covariance: [[f64::NAN; 6]; 6],
+            free_directions: Vec::new(),
+            status,
+            overlap: 0.0,
+        }
     }
 }

@@ -2,37 +2,48 @@
 
 use super::correspondences::Correspondences;
 use super::local_map::LocalMap;
+use super::map_surface::MapSurface;
 use super::settings::ScanAlignmentSettings;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
-use crate::alignment::{GicpSettings, blocks, clustered_covariance, gicp_with, solve_determined};
+use crate::alignment::{
+    FreeDirection, GicpSettings, Rivals, blocks, clustered_covariance, gicp_with, halves, orthonormal,
+    solve_determined, systematic_covariance, unscaled,
+};
+use crate::random::some_of;
 use crate::statistics::{DEVIATIONS_PER_MEDIAN, median};
 use nalgebra::{Matrix6, Vector3, Vector6};
 use std::collections::BTreeMap;
 
 /// Eigenvalues of the normal matrix below this share of the largest are rounding: no step goes there.
 const ROUNDING: f64 = 1e-9;
+/// What a correspondence would have to say about a motion that steps leave out, in what one along its normal says.
+const FIXED: f64 = 1e6;
 
 /// How a scan lies on the map; lengths are in voxels.
 #[allow(non_snake_case)]
 #[derive(Debug, Clone)]
 pub(super) struct ScanAlignment {
     pub T_map_scan: RigidTransform,
-    /// Of the twist in the scan's axes by which the pose is off, if the map is right.
+    /// Of the twist in the scan's axes by which the pose is off, if the map is right; without free directions, along
+    /// which the pose is the predicted one.
     pub covariance: Matrix6<f64>,
+    /// What errs alike over large parts of the scan, likewise.
+    pub systematic: Matrix6<f64>,
     /// Share of the scan's points that lie on the map's surface.
     pub overlap: f64,
     /// Share of the map's points in free space, of those that the sensor would have measured.
     pub free_space: f64,
     /// Share of the scan's points that the map lacks, of those that earlier scans would have measured.
     pub unexplained: f64,
-    /// Whether the correspondences determine all six unknowns.
-    pub observable: bool,
+    /// Motions that the map does not determine, in the scan's coordinates.
+    pub free_directions: Vec<FreeDirection>,
     /// The scans that the map's points on which it lies came from, each with its share of them.
     pub scans: Vec<(u32, f64)>,
 }
 
-/// Aligns a scan from a pose nearby; `None` where it hardly meets the map.
+/// Aligns a scan from a pose nearby; `None` where it hardly meets the map. Along motions that the map does not determine
+/// the pose stays where it started.
 ///
 /// `max_distance` is between corresponding points, in the first round; `would_be_known` tells by the scan's pose which
 /// of its points earlier scans would have measured.
@@ -66,7 +77,22 @@ pub(super) fn align<F: Fn([f64; 3]) -> bool>(
     }
     // Products of rotations are rotations but for rounding, which would grow with the trajectory.
     pose = RigidTransform::from_matrix(&pose.to_matrix()).unwrap_or(pose);
-    let plane = PointToPlane::new(scan, map, &pose, &mut correspondences, settings)?;
+    let mut plane = PointToPlane::new(scan, map, &pose, &mut correspondences, settings)?;
+    let free_directions = plane.free_directions(scan, map, &pose, settings);
+    let twists: Vec<Vector6<f64>> =
+        free_directions.iter().flat_map(|direction| direction.twists([0.0; 3])).collect();
+    if !twists.is_empty() {
+        let unit = plane.unit();
+        let fixed = orthonormal(&twists, unit);
+        pose = without_motion(&start, &pose, &fixed, unit);
+        for _ in 0..settings.constrained_steps {
+            plane = PointToPlane::new(scan, map, &pose, &mut correspondences, settings)?;
+            plane.fix(&fixed, unit);
+            pose = pose * plane.step();
+        }
+        plane = PointToPlane::new(scan, map, &pose, &mut correspondences, settings)?;
+        plane.fix(&fixed, unit);
+    }
     let is_known = would_be_known(&pose);
     let (mut known, mut lacking) = (0_usize, 0_usize);
     for (point, explained) in scan.points.iter().zip(&plane.explained) {
@@ -77,15 +103,31 @@ pub(super) fn align<F: Fn([f64; 3]) -> bool>(
     let to_scan = pose.inverse();
     let stride = map.len().div_ceil(settings.free_space_samples.max(1)).max(1);
     let samples = map.points().iter().step_by(stride).map(|point| to_scan.transform_point(*point));
+    let (covariance, systematic) = plane.covariance();
     Some(ScanAlignment {
         T_map_scan: pose,
-        covariance: plane.covariance(),
+        covariance,
+        systematic,
         overlap: plane.on_map as f64 / scan.points.len() as f64,
         free_space: scan.range_image.free_space_share(samples),
         unexplained: lacking as f64 / known.max(1) as f64,
-        observable: plane.is_observable(settings.min_observability),
+        free_directions,
         scans: plane.shares_of_scans(map),
     })
+}
+
+/// A pose without the part of its motion from a start that is along unit motions, which have rotations in units of
+/// `unit`.
+fn without_motion(
+    start: &RigidTransform,
+    pose: &RigidTransform,
+    motions: &[Vector6<f64>],
+    unit: f64,
+) -> RigidTransform {
+    let twist = Vector6::from((start.inverse() * *pose).log());
+    let scaled = Vector6::from_fn(|k, _| if k < 3 { unit * twist[k] } else { twist[k] });
+    let rest = motions.iter().fold(scaled, |rest, motion| rest - motion * motion.dot(&rest));
+    *start * RigidTransform::exp(unscaled(&rest, unit).into())
 }
 
 /// The inliers of a pose, linearised.
@@ -103,6 +145,8 @@ struct PointToPlane {
     on_map: usize,
     information: Matrix6<f64>,
     gradient: Vector6<f64>,
+    /// Largest residual of an inlier.
+    limit: f64,
 }
 
 impl PointToPlane {
@@ -139,6 +183,7 @@ impl PointToPlane {
             on_map: 0,
             information: Matrix6::zeros(),
             gradient: Vector6::zeros(),
+            limit,
         };
         let to_scan = pose.inverse();
         for ((other, residual), point) in found.iter().zip(&residuals).zip(&scan.points) {
@@ -181,20 +226,61 @@ impl PointToPlane {
         RigidTransform::from_rotation_vector([x, y, z], translation)
     }
 
-    /// Whether the least eigenvalue, with rotations in units of the size of their torques, is large enough.
-    fn is_observable(&self, least_for_each: f64) -> bool {
-        let torques = (0..3).map(|k| self.information[(k, k)]).sum::<f64>();
-        let size = (torques / self.residuals.len() as f64).sqrt();
-        let unit = if size > 0.0 { size } else { 1.0 };
-        let scale = Vector6::from_fn(|k, _| if k < 3 { 1.0 / unit } else { 1.0 });
-        let scaled = Matrix6::from_fn(|i, j| scale[i] * self.information[(i, j)] * scale[j]);
-        scaled.symmetric_eigenvalues().min() > least_for_each * self.residuals.len() as f64
+    /// The length by which a rotation moves the surface along its normals, per radian.
+    fn unit(&self) -> f64 {
+        let torques = self.design.iter().map(|row| Vector3::new(row[0], row[1], row[2]).norm_squared());
+        let size = (torques.sum::<f64>() / self.residuals.len() as f64).sqrt();
+        if size > 0.0 { size } else { 1.0 }
     }
 
-    /// By blocks of neighbouring points, or by points where blocks are few.
-    fn covariance(&self) -> Matrix6<f64> {
+    /// Makes steps leave out unit motions, which have rotations in units of `unit`.
+    fn fix(&mut self, motions: &[Vector6<f64>], unit: f64) {
+        let weight = FIXED * self.residuals.len() as f64;
+        let lengths = Matrix6::from_diagonal(&Vector6::from_fn(|k, _| if k < 3 { unit } else { 1.0 }));
+        for motion in motions {
+            let row = lengths * motion;
+            self.information += row * row.transpose() * weight;
+        }
+    }
+
+    /// By blocks of neighbouring points, or by points where blocks are few; and what halves say beyond.
+    fn covariance(&self) -> (Matrix6<f64>, Matrix6<f64>) {
         let block = blocks(&self.points).unwrap_or_else(|| (0..self.points.len() as u32).collect());
-        clustered_covariance(&self.design, &self.residuals, &block)
+        let normals: Vec<[f64; 3]> = self.design.iter().map(|row| [row[3], row[4], row[5]]).collect();
+        let divided = halves(&self.points, &normals);
+        (
+            clustered_covariance(&self.design, &self.residuals, &block),
+            systematic_covariance(&self.design, &self.residuals, &divided, &block),
+        )
+    }
+
+    /// Motions of the scan, in its coordinates, that the map does not determine.
+    fn free_directions(
+        &self,
+        scan: &ThinnedScan,
+        map: &LocalMap,
+        pose: &RigidTransform,
+        settings: &ScanAlignmentSettings,
+    ) -> Vec<FreeDirection> {
+        let rivals_settings = settings.rivals;
+        let some: Vec<[f64; 3]> = some_of(scan.points.len(), rivals_settings.points)
+            .into_iter()
+            .map(|number| scan.points[number])
+            .collect();
+        let rivals = Rivals {
+            surface: MapSurface::new(map, self.limit, settings),
+            source: &some,
+            T_target_source: *pose,
+            radius: settings.rival_radius,
+            settings: rivals_settings,
+        };
+        let explained = rivals.explained();
+        let points = pose.transform_points(&self.points);
+        let normal = |row: &[f64; 6]| pose.transform_vector([row[3], row[4], row[5]]);
+        let normals: Vec<[f64; 3]> = self.design.iter().map(normal).collect();
+        let to_scan = pose.inverse();
+        let found = rivals.free_directions(&explained, &points, &normals);
+        found.iter().map(|direction| direction.transformed(&to_scan)).collect()
     }
 
     fn shares_of_scans(&self, map: &LocalMap) -> Vec<(u32, f64)> {

@@ -1,6 +1,7 @@
 //! All that odometry is told: each number once, with its unit, its meaning and its reason.
 
 use crate::Error;
+use crate::alignment::RivalSettings;
 use crate::visibility::RangeImageSettings;
 
 /// How [`crate::Odometry`] works. Nothing has to be set. `benchmarks/sweep_settings.py` shows what other values give on
@@ -123,9 +124,15 @@ pub struct ScanAlignmentSettings {
     /// Distance to the map's nearest point, in voxels, within which the map explains a point whatever the residual, as
     /// at edges, where the map's normal is none.
     pub explained_distance: f64,
-    /// Least eigenvalue of the normal matrix for one correspondence, with rotations scaled to the same size, with which
-    /// the pose is observable: about a seventieth of the mean of a room, several times that of a long corridor.
-    pub min_observability: f64,
+    /// When a motion is not determined by the map: the scan is pushed along weak ones.
+    pub rivals: RivalSettings,
+    /// Length, in voxels, that stands there for the radius of a patch: the scan is pushed by half of it, which in a
+    /// room is as far as in registration.
+    pub rival_radius: f64,
+    /// Steps point to plane of a scan that was pushed, at most.
+    pub rival_steps: usize,
+    /// Steps point to plane once it is known which motions the map does not determine.
+    pub constrained_steps: usize,
     /// Correspondences without which there is no pose.
     pub min_correspondences: usize,
     /// Points of the map, at most, that are looked up in the scan's range image: their share needs no more.
@@ -145,7 +152,10 @@ impl Default for ScanAlignmentSettings {
             max_deviation: 3.0,
             min_deviation: 0.02,
             explained_distance: 1.2,
-            min_observability: 5e-3,
+            rivals: RivalSettings { points: 500, ..RivalSettings::default() },
+            rival_radius: 8.0,
+            rival_steps: 8,
+            constrained_steps: 3,
             min_correspondences: 30,
             free_space_samples: 8000,
         }

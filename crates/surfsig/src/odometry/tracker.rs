@@ -9,11 +9,14 @@ use super::scan_alignment::{ScanAlignment, align};
 use super::settings::OdometrySettings;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
+use crate::alignment::{FreeDirection, orthonormal, unscaled};
 use crate::statistics::quantile;
 use nalgebra::{Matrix6, Vector3};
 
 /// Share of a scan's points that the map's range is taken from.
 const MOST: f64 = 0.99;
+/// Part of a motion that nothing determines from which on a motion counts as such a one.
+pub(super) const LEAST_OPEN: f64 = 0.1;
 
 /// A scan with a pose; lengths are in voxels, and the scan is about its sensor.
 #[allow(non_snake_case)]
@@ -23,16 +26,48 @@ pub(super) struct Step {
     pub number: usize,
     pub T_map_scan: RigidTransform,
     /// Of the twist in the scan's axes by which the pose is off.
-    pub covariance: Matrix6<f64>,
+    pub covariance: Covariance,
+    /// Motions, in the scan's coordinates, that the map does not determine.
+    pub free_directions: Vec<FreeDirection>,
     pub status: ScanStatus,
     pub overlap: f64,
+}
+
+/// What a pose may be off by.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Covariance {
+    /// By chance, in each scan anew.
+    pub random: Matrix6<f64>,
+    /// Alike in all scans.
+    pub systematic: Matrix6<f64>,
+    /// Along motions that nothing determines, in the unknown variance of such a motion: they stay apart from the
+    /// others, so that the small angles between those of several scans do not count.
+    pub open: Matrix6<f64>,
+}
+
+impl Covariance {
+    fn zeros() -> Self {
+        Self { random: Matrix6::zeros(), systematic: Matrix6::zeros(), open: Matrix6::zeros() }
+    }
+
+    /// In other axes.
+    fn carried(&self, transform: &RigidTransform) -> Self {
+        let adjoint = transform.adjoint();
+        let adjoint = Matrix6::from_fn(|row, column| adjoint[row][column]);
+        let carried = |covariance: &Matrix6<f64>| adjoint * covariance * adjoint.transpose();
+        Self {
+            random: carried(&self.random),
+            systematic: carried(&self.systematic),
+            open: carried(&self.open),
+        }
+    }
 }
 
 /// Keeps the map, the motion and the keyframes; lengths are in voxels.
 pub(super) struct Tracker {
     settings: OdometrySettings,
     /// Median range of the first scan.
-    median_range: f64,
+    pub median_range: f64,
     /// Given largest distances, if any.
     fixed_map_range: Option<f64>,
     fixed_correspondence_distance: Option<f64>,
@@ -40,7 +75,7 @@ pub(super) struct Tracker {
     map: LocalMap,
     keyframes: Keyframes,
     /// Poses and covariances of the scans that are in the map, by their numbers.
-    mapped: Vec<Option<(RigidTransform, Matrix6<f64>)>>,
+    mapped: Vec<Option<(RigidTransform, Covariance)>>,
     last: RigidTransform,
     /// From a scan to the next one.
     motion: RigidTransform,
@@ -98,7 +133,8 @@ impl Tracker {
             let first = Step {
                 number: self.number,
                 T_map_scan: RigidTransform::identity(),
-                covariance: Matrix6::zeros(),
+                covariance: Covariance::zeros(),
+                free_directions: Vec::new(),
                 status: ScanStatus::Tracked,
                 overlap: 1.0,
             };
@@ -111,7 +147,7 @@ impl Tracker {
             doubted => self.relocalised_or_doubted(scan, doubted, &prediction),
         };
         let min_overlap = self.settings.expectation.min_overlap;
-        let believed = chosen.filter(|(found, _)| found.observable && found.overlap >= min_overlap);
+        let believed = chosen.filter(|(found, _)| found.overlap >= min_overlap);
         let Some((found, status)) = believed else {
             self.lose();
             return Vec::new();
@@ -120,6 +156,7 @@ impl Tracker {
             number: self.number,
             T_map_scan: found.T_map_scan,
             covariance: self.covariance(&found),
+            free_directions: found.free_directions.clone(),
             status,
             overlap: found.overlap,
         };
@@ -145,7 +182,8 @@ impl Tracker {
         doubted: Option<ScanAlignment>,
         prediction: &RigidTransform,
     ) -> Option<(ScanAlignment, ScanStatus)> {
-        let is_met = |found: &ScanAlignment| self.expectation.is_met(found);
+        let is_met =
+            |found: &ScanAlignment| found.free_directions.is_empty() && self.expectation.is_met(found);
         let searched = self.keyframes.find(scan, self.map_range, is_met);
         if let Some((found, map)) = searched.filter(|(found, _)| self.is_better(found, doubted.as_ref())) {
             self.map = map;
@@ -190,7 +228,7 @@ impl Tracker {
 
     /// Whether a pose that was searched takes the place of the doubted one.
     fn is_better(&self, searched: &ScanAlignment, doubted: Option<&ScanAlignment>) -> bool {
-        let Some(doubted) = doubted.filter(|doubted| doubted.observable) else { return true };
+        let Some(doubted) = doubted.filter(|doubted| doubted.free_directions.is_empty()) else { return true };
         let apart = self.distance_at_range(&(doubted.T_map_scan.inverse() * searched.T_map_scan));
         let gain = self.settings.relocalisation.overlap_gain;
         apart > self.settings.prediction.min_correspondence_distance
@@ -222,17 +260,27 @@ impl Tracker {
     }
 
     /// Adds the error of the map, which is that of the scans that it was made of.
-    fn covariance(&self, found: &ScanAlignment) -> Matrix6<f64> {
+    fn covariance(&self, found: &ScanAlignment) -> Covariance {
         let to_scan = found.T_map_scan.inverse();
-        let mut covariance = found.covariance;
+        let mut of_map = Covariance::zeros();
         for &(number, share) in &found.scans {
             if let Some((pose, of_scan)) = &self.mapped[number as usize] {
-                let adjoint = (to_scan * *pose).adjoint();
-                let carried = Matrix6::from_fn(|row, column| adjoint[row][column]);
-                covariance += carried * of_scan * carried.transpose() * share;
+                let carried = of_scan.carried(&(to_scan * *pose));
+                of_map.random += carried.random * share;
+                of_map.systematic += carried.systematic * share;
+                of_map.open += carried.open * share;
             }
         }
-        covariance
+        let unit = self.median_range;
+        let mut open = of_map.open;
+        for direction in &found.free_directions {
+            for motion in orthonormal(&direction.twists([0.0; 3]), unit) {
+                let twist = unscaled(&motion, unit);
+                open += twist * twist.transpose();
+            }
+        }
+        let random = found.covariance + of_map.random;
+        Covariance { random, systematic: sum_of_alike(&found.systematic, &of_map.systematic, unit), open }
     }
 
     /// Puts a scan into the map, and gives its step after those that it confirms.
@@ -280,6 +328,19 @@ impl Tracker {
     }
 }
 
+/// The covariance of a sum whose parts may err alike: the least one that none of their correlations exceeds in trace, with
+/// rotations in units of `unit`.
+fn sum_of_alike(one: &Matrix6<f64>, other: &Matrix6<f64>, unit: f64) -> Matrix6<f64> {
+    let size = |covariance: &Matrix6<f64>| {
+        (0..6).map(|k| covariance[(k, k)] * if k < 3 { unit * unit } else { 1.0 }).sum::<f64>().sqrt()
+    };
+    let (of_one, of_other) = (size(one), size(other));
+    if of_one == 0.0 || of_other == 0.0 {
+        return one + other;
+    }
+    one * (1.0 + of_other / of_one) + other * (1.0 + of_one / of_other)
+}
+
 /// The motion of several steps.
 fn power(motion: RigidTransform, steps: usize) -> RigidTransform {
     RigidTransform::exp(motion.log().map(|component| component * steps as f64))
@@ -294,6 +355,14 @@ pub(super) fn rotation_angle(motion: &RigidTransform) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_that_err_alike_add_up_before_they_are_squared() {
+        let one = Matrix6::identity() * 0.04;
+        let sum = sum_of_alike(&one, &(one * 9.0), 5.0);
+        assert!((sum - Matrix6::identity() * 0.64).amax() < 1e-12, "0.2 + 0.6, squared");
+        assert_eq!(sum_of_alike(&one, &Matrix6::zeros(), 5.0), one);
+    }
 
     #[test]
     fn a_motion_that_goes_on_is_repeated() {

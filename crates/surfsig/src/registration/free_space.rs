@@ -3,7 +3,7 @@
 use super::settings::FreeSpaceSettings;
 use crate::geometry::RigidTransform;
 use crate::scan::CenteredScan;
-use crate::visibility::{RangeImageSettings, SphericalRangeImage, all_seen_from};
+use crate::visibility::{RangeImageSettings, SphericalRangeImage, Visibility, all_seen_from};
 
 /// What two sensors saw, as far as is known from where they saw all of their scans, and some points of both.
 pub(super) struct BothSensors<'a> {
@@ -29,6 +29,11 @@ impl<'a> BothSensors<'a> {
             target: samples[1],
             settings,
         }
+    }
+
+    /// Whether a point is behind what the target's sensor saw: what lies there it cannot have measured.
+    pub fn is_hidden_from_target(&self, point: [f64; 3]) -> bool {
+        self.of_target.as_ref().is_some_and(|view| view.is_hidden(point))
     }
 
     /// The larger share of points of one scan that lie in the other sensor's free space, of those that it would have
@@ -68,6 +73,11 @@ impl SensorView {
             relative_margin: settings.relative_margin,
         };
         Some(Self { viewpoint, image: SphericalRangeImage::new(&seen, image) })
+    }
+
+    fn is_hidden(&self, point: [f64; 3]) -> bool {
+        let from_viewpoint = std::array::from_fn(|k| point[k] - self.viewpoint[k]);
+        self.image.visibility(from_viewpoint) == Visibility::Hidden
     }
 
     /// The share of points in free space, of those that the sensor would have measured; NaN where these are few.

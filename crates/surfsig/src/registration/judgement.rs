@@ -1,9 +1,11 @@
 //! The tests that a transform must survive before it is trusted.
 
-use super::doubt::Doubt;
 use super::free_space::BothSensors;
 use super::settings::RegistrationSettings;
-use crate::alignment::{Alternative, Explained, FreeDirection, PointToSurface, Rivals, TargetSurface};
+use crate::alignment::{
+    Alternative, Doubt, FittedTarget, FreeDirection, PointToSurface, Rivals, ScaleLimits, TargetSurface,
+    symmetries,
+};
 use crate::geometry::RigidTransform;
 use crate::random::some_of;
 
@@ -43,18 +45,35 @@ impl Judge<'_> {
         let settings = self.settings;
         let numbers = some_of(self.sample.len(), settings.rivals.points);
         let some: Vec<[f64; 3]> = numbers.into_iter().map(|i| self.sample[i]).collect();
+        let is_hidden = |point: [f64; 3]| self.sensors.is_hidden_from_target(point);
         let rivals = Rivals {
-            surface: self.surface,
+            surface: FittedTarget {
+                surface: self.surface,
+                farthest: found.farthest,
+                fit: settings.rival_fit,
+                is_hidden: &is_hidden,
+            },
             source: &some,
-            best: found,
+            T_target_source: found.T_target_source,
             radius: self.radius,
             settings: settings.rivals,
-            fit: settings.rival_fit,
         };
         let best = rivals.explained();
         let free_space = self.sensors.free_space(&found.T_target_source);
+        let moved = found.T_target_source.transform_points(&some);
+        let symmetric = symmetries(self.surface.points(), &found.normals, &moved, self.radius);
+        let proposed: Vec<RigidTransform> = proposed
+            .iter()
+            .copied()
+            .chain(symmetric.into_iter().map(|symmetry| symmetry * found.T_target_source))
+            .collect();
+        // Where less is in free space, something that only one scan shows may explain less.
+        let deficit = |transform: &RigidTransform| {
+            let is_freer = self.sensors.free_space(transform) < free_space - settings.free_space.excess;
+            if is_freer { settings.free_space.deficit } else { settings.rivals.deficit }
+        };
         let alternatives: Vec<Alternative> = rivals
-            .as_good_as_the_best(&best, proposed)
+            .as_good_as_the_best(&best, &proposed, deficit)
             .into_iter()
             .map(|(transform, explained)| Alternative {
                 T_target_source: transform,
@@ -74,14 +93,19 @@ impl Judge<'_> {
         let mut judged = Judgement {
             better: alternatives.iter().find(is_better).map(|rival| rival.T_target_source),
             doubts: Vec::new(),
-            free_directions: rivals.free_directions(&best),
+            free_directions: rivals.free_directions(&best, &found.points, &found.normals),
             alternatives,
             explained: best.share(),
             free_space,
             scale: f64::NAN,
             scale_standard_error: f64::NAN,
         };
-        self.scale(&rivals, &best, &mut judged);
+        let limits = ScaleLimits { doubted: settings.doubted_scale, deviations: settings.scale_deviations };
+        let (scale, doubt) = rivals.surface.scale(&moved, &best, limits);
+        if let Some(scale) = scale {
+            (judged.scale, judged.scale_standard_error) = (scale.scale, scale.standard_error);
+        }
+        judged.doubts.extend(doubt);
         self.doubt(found, inliers, &mut judged);
         judged
     }
@@ -111,23 +135,6 @@ impl Judge<'_> {
         }
         if !judged.alternatives.is_empty() {
             doubts.push(Doubt::Ambiguous { alternatives: judged.alternatives.len() });
-        }
-    }
-
-    /// Whether a source of another size fits better.
-    fn scale(&self, rivals: &Rivals<'_>, best: &Explained, judged: &mut Judgement) {
-        let moved = rivals.best.T_target_source.transform_points(rivals.source);
-        let Some(found) = self.surface.scale_of(&moved, &self.settings.rival_fit) else { return };
-        judged.scale = found.scale;
-        judged.scale_standard_error = found.standard_error;
-        let off = found.scale.ln().abs();
-        let is_significant = off > self.settings.scale_deviations * found.standard_error / found.scale;
-        let deficit = best.deficit_of(&rivals.closeness_of(&found.points));
-        if is_significant
-            && off > self.settings.doubted_scale
-            && deficit.is_some_and(|(deficit, _)| deficit < 0.0)
-        {
-            judged.doubts.push(Doubt::Scale { scale: found.scale, standard_error: found.standard_error });
         }
     }
 }

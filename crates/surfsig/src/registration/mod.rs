@@ -4,13 +4,11 @@
 //! ([`crate::ConsensusSettings`]), generalised ICP refines it ([`crate::gicp`]), the last steps fit points to the
 //! surface and tell how sure it is, and then it is tried to refute the result ([`Doubt`]).
 
-mod doubt;
 mod free_space;
 mod judgement;
 mod result;
 mod settings;
 
-pub use doubt::Doubt;
 pub use result::Registration;
 pub use settings::{FreeSpaceSettings, RegistrationSettings};
 
@@ -18,7 +16,8 @@ use free_space::BothSensors;
 use judgement::{Judge, Judgement};
 
 use crate::alignment::{
-    Alternative, Correspondences, GicpCloud, GicpSettings, PointToSurface, TargetSurface, even_sample, gicp,
+    Alternative, Correspondences, Doubt, GicpCloud, GicpSettings, PointToSurface, TargetSurface, even_sample,
+    gicp, infinite_along, information_without,
 };
 use crate::field::{KeypointOptions, keypoints_within, match_fields};
 use crate::geometry::RigidTransform;
@@ -156,13 +155,15 @@ fn registered(
     }
     let Judgement { doubts, free_directions, alternatives, .. } = judged;
     monitor.add(1);
+    let open: Vec<_> = free_directions.iter().flat_map(|direction| direction.twists(found.center)).collect();
     let in_scans = |transform: RigidTransform| to_target * transform * from_source.inverse();
     let alternatives = alternatives
         .into_iter()
         .map(|rival: Alternative| Alternative { T_target_source: in_scans(rival.T_target_source), ..rival });
     Ok(Registration {
         T_target_source: Some(in_scans(found.T_target_source)),
-        covariance: found.covariance.into(),
+        covariance: infinite_along(&found.covariance, &open, radius).into(),
+        information: information_without(&found.covariance, &open, radius).into(),
         center: to_target.transform_point(found.center),
         trusted: doubts.is_empty(),
         doubts,

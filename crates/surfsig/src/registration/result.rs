@@ -1,7 +1,6 @@
 //! What [`crate::register`] gives.
 
-use super::doubt::Doubt;
-use crate::alignment::{Alternative, FreeDirection};
+use crate::alignment::{Alternative, Doubt, FreeDirection};
 use crate::geometry::RigidTransform;
 
 /// How a source lies in a target, and how sure that is.
@@ -20,7 +19,11 @@ pub struct Registration {
     pub T_target_source: Option<RigidTransform>,
     /// Of the small twist (rotation vector in radians, then translation) in the target's axes, about `center`, that
     /// takes the given transform to the true one. Large in the free directions; NaN where nothing was found.
+    ///
+    /// Infinite in the entries of free directions; the others are the limit as that variance grows.
     pub covariance: [[f64; 6]; 6],
+    /// Its inverse, which is 0 along free directions.
+    pub information: [[f64; 6]; 6],
     /// Middle of the overlap, in the target's coordinates.
     pub center: [f64; 3],
     /// Motions of the source, in the target's coordinates, that the overlap does not determine.
@@ -59,6 +62,7 @@ impl Registration {
         Self {
             T_target_source: None,
             covariance: [[f64::NAN; 6]; 6],
+            information: [[f64::NAN; 6]; 6],
             center: [f64::NAN; 3],
             free_directions: Vec::new(),
             alternatives: Vec::new(),
