@@ -35,8 +35,8 @@ def test_extract_writes_a_page(shell: Callable[..., Any], scan: Path, tmp_path: 
     assert report["title"].endswith("scan.ply")
     assert layer["count"] == 500
     assert np.nanmax(layer["columns"]["zeta"]) > 0.9
-    how = ("--radius", "0.4", "-o", tmp_path / "out.ply", "--report", "nowhere/p.html")
-    refused = shell("extract", scan, *how)
+    nowhere = ("--radius", "0.4", "-o", tmp_path / "out.ply", "--report", "nowhere/p.html")
+    refused = shell("extract", scan, *nowhere)
     assert refused.code == 2
     assert "nowhere/p.html: No such file or directory" in refused.err
 

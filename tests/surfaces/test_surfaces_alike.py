@@ -77,7 +77,7 @@ def test_a_sensor_that_measures_in_steps(step: float, jitter: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("step", [0.0008, 0.001, 0.0012, 0.0017])
 def test_no_step_is_a_surface(step: float) -> None:
-    """Nor where there is no noise but steps: two of them are a quadric, so that it looked like an exact model.
+    """Nor where there is no noise but steps: two of them are a quadric, so that it looked like a model.
 
     The wall and the ball are found; the pipe, along whose columns depth is the same, may be in pieces.
     """

@@ -38,7 +38,9 @@ def report_html(
     positions = np.where(known[:, None], found.poses[:, :3, 3], np.nan)
     rotations = found.poses[:, :3, :3]
     # The covariance is in the scan's own frame; its translations turn with the scan.
-    covariances = rotations @ found.covariances[:, 3:, 3:] @ np.swapaxes(rotations, 1, 2)
+    # Where a motion is free, infinities give no ellipsoid.
+    with np.errstate(invalid="ignore"):
+        covariances = rotations @ found.covariances[:, 3:, 3:] @ np.swapaxes(rotations, 1, 2)
     layers = [] if scans is None else [_map(found.poses, known, scans, most_points)]
     if not layers:
         layers = [Layer("positions", positions, columns={"scan": np.arange(len(positions))})]
