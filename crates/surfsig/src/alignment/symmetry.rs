@@ -103,7 +103,10 @@ fn middle(points: &[[f64; 3]], axes: &Matrix3<f64>) -> Vector3<f64> {
 fn rotations(axes: &Matrix3<f64>) -> Vec<Rotation3<f64>> {
     let mut found: Vec<Rotation3<f64>> = vec![Rotation3::identity()];
     let mut add = |rotation: Rotation3<f64>| {
-        if found.iter().all(|other| other.angle_to(&rotation) > SAME) {
+        // The difference of two rotations by a small angle; nalgebra's angle is not a number near half a turn.
+        let differs =
+            |other: &Rotation3<f64>| (other.matrix() - rotation.matrix()).norm() > SAME * 2.0_f64.sqrt();
+        if found.iter().all(differs) {
             found.push(rotation);
         }
     };

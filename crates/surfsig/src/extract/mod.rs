@@ -272,6 +272,8 @@ fn run(
             Share::Region { corner, cells } => worker.extract_region(*corner, cells, &mut parts, monitor),
         },
     )?;
+    // Who watches may have stopped the last part.
+    monitor.check()?;
     let oriented = options.viewpoint.is_some() || options.directions.is_some();
     let query_of_entry = shares.iter().flat_map(Share::ranks).map(|rank| asked.point_of_rank[rank]);
     let entries = Entries::new(queries.len(cloud), query_of_entry);

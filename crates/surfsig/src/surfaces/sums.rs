@@ -37,13 +37,14 @@ impl SurfaceSums {
     /// let height = |i: i32| 0.01 * f64::from(i * i % 7);
     /// let points: Vec<[f64; 3]> =
     ///     (0..900).map(|i| [f64::from(i % 30), f64::from(i / 30), height(i)]).collect();
-    /// let near = fit_primitive(&points[..90], SurfaceKind::Plane, None).unwrap();
+    /// let some: Vec<[f64; 3]> = points.iter().copied().step_by(7).collect();
+    /// let near = fit_primitive(&some, SurfaceKind::Plane, None).unwrap();
     /// let mut sums = SurfaceSums::new(&near, &points[..500], 0.1);
     /// sums.add(&SurfaceSums::new(&near, &points[500..], 0.1));
     /// let found = sums.fitted(&near).unwrap();
     /// let all = fit_primitive(&points, SurfaceKind::Plane, None).unwrap();
     /// let distance = all.distances(&[found.point])[0];
-    /// assert!(distance.abs() < 1e-9 && found.count == 900);
+    /// assert!(distance.abs() < 1e-6 && found.count == 900);
     /// ```
     pub fn new(near: &Primitive, points: &[[f64; 3]], limit: f64) -> Self {
         let points: Vec<Vector> = points.iter().map(|&point| Vector::from(point)).collect();
@@ -166,8 +167,11 @@ mod tests {
     #[test]
     fn sums_of_parts_give_the_fit_to_all_points() {
         let mut draws = Draws(21);
-        let points = pipe(8000, &mut draws);
-        let near = fit_primitive(&points[..400], SurfaceKind::Cylinder, None).unwrap();
+        let mut points = pipe(8000, &mut draws);
+        // Parts lie side by side, as tiles do.
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let some: Vec<[f64; 3]> = points.iter().copied().step_by(20).collect();
+        let near = fit_primitive(&some, SurfaceKind::Cylinder, None).unwrap();
         let all = fit_primitive(&points, SurfaceKind::Cylinder, Some(&near)).unwrap();
         let mut sums = SurfaceSums::new(&near, &points[..1000], 1.0);
         for part in points[1000..].chunks(700) {
@@ -177,7 +181,9 @@ mod tests {
         let sure = all.uncertainty(&points);
         let error = sure.covariance[24].sqrt();
         assert!((found.radius - all.radius()).abs() < 0.1 * error, "{} {}", found.radius, all.radius());
-        assert!((0.7..1.4).contains(&(found.radius_std / error)), "{} {error}", found.radius_std);
+        // The largest over several sizes of blocks, which of many small parts is up to 1.6 times as large.
+        let ratio = found.radius_std / error;
+        assert!((0.8..1.7).contains(&ratio), "{ratio} {}", sums.crossing);
         assert!(all.distances(&[found.point])[0] + 0.5 < 1e-3 * 0.5);
         assert!((found.deviation / 0.01 - 1.0).abs() < 0.03 && found.count == 8000);
         assert!(sums.blocks.len() <= MOST_BLOCKS);
