@@ -182,7 +182,9 @@ def test_the_examples(installed: Path, tmp_path: Path, target: str) -> None:
     )
     assert zeta == pytest.approx([1, 1, surfsig.similarity(sphere, saddle)], abs=0.005)
 
-    _, plane, ball, pipe, seen = [line.split() for line in run(build / "surfaces").splitlines()]
+    _, *found, seen = [line.split() for line in run(build / "surfaces").splitlines()]
+    # Ball and pipe have about as many points.
+    plane, ball, pipe = sorted(found, key=lambda row: ["plane", "sphere", "cylinder"].index(row[0]))
     assert [row[0] for row in (plane, ball, pipe)] == ["plane", "sphere", "cylinder"]
     assert [int(row[1]) for row in (plane, ball, pipe)] == pytest.approx([12_000, 6000, 6000], rel=0.01)
     assert [float(row[2]) for row in (ball, pipe)] == pytest.approx([0.3, 0.1], abs=1e-4)

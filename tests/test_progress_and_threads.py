@@ -56,6 +56,7 @@ CALLS: dict[str, Callable[..., Any]] = {
 OTHERS = {
     "estimate_odometry": "it tells nothing yet",
     "extract_tiles": "it tells what it does, too",
+    "find_surfaces_tiles": "it tells what it does, too",
     "register_multiway": "each pair is registered as by `register`",
     "read": "one thread reads",
     "write": "one thread writes",

@@ -24,6 +24,7 @@ IMPORTED_FOR_CHECKERS = {
     "Client": object,
     "ScalarMappable": object,
     "Extraction": surfsig.Extraction,
+    "ShapeKind": str,
 }
 """Names in type hints that modules import for type checkers only."""
 

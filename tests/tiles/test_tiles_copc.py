@@ -60,7 +60,7 @@ def test_each_point_has_one_tile_and_its_whole_halo(path: Path) -> None:
 def test_tiles_have_the_bits_of_the_whole(
     path: Path, tmp_path: Path, how: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("surfsig.tiles.extraction.cut_by_count", lambda *_: in_quarters)
+    monkeypatch.setattr("surfsig.tiles.job.cut_by_count", lambda *_: in_quarters)
     found = surfsig.extract_tiles(path, tmp_path / "out", suffix=".npz", **how)
     assert not list((tmp_path / "out" / "store").glob("*")) if (tmp_path / "out" / "store").exists() else True
     parts, whole = found.read(), surfsig.read(path)
