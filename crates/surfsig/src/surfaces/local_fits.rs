@@ -79,6 +79,13 @@ impl LocalFit {
     }
 }
 
+/// What was fitted at a point, and what was made of its nearest points.
+pub(super) struct FitAt<T> {
+    pub point: u32,
+    pub fit: LocalFit,
+    pub taken: T,
+}
+
 /// Fits quadrics, for a paraboloid's bias would seem to be noise, to so many nearest points of some of a tree's points
 /// (each by its number, once), and shows `take` of each what was fitted and at least `fewest` nearest points with the
 /// squares of their distances, itself among them, the nearest first. What `take` makes of them comes in the order of
@@ -91,7 +98,7 @@ pub(super) fn fit_nearest<T: Send>(
     fewest: usize,
     take: &(impl Fn(u32, &[(f64, u32)]) -> T + Sync),
     monitor: &Monitor,
-) -> Result<Vec<Vec<(u32, LocalFit, T)>>, Error> {
+) -> Result<Vec<Vec<FitAt<T>>>, Error> {
     let set = InstructionSet::detect();
     let of_part = |search: &mut Search, part: &[u32]| {
         monitor.check()?;
@@ -111,14 +118,14 @@ pub(super) fn fit_nearest<T: Send>(
             }));
             search.moments.push(search.members.moments::<f64>(set, |_| true));
             search.radii.push(radius);
-            fits.push((point, LocalFit::MISSING, take(point, &search.found)));
+            fits.push(FitAt { point, fit: LocalFit::MISSING, taken: take(point, &search.found) });
             if search.moments.len() == LANES {
                 let start = fits.len() - LANES;
-                search.fit(set, fits[start..].iter_mut().map(|(_, fit, _)| fit));
+                search.fit(set, fits[start..].iter_mut().map(|at| &mut at.fit));
             }
         }
         let start = fits.len() - search.moments.len();
-        search.fit(set, fits[start..].iter_mut().map(|(_, fit, _)| fit));
+        search.fit(set, fits[start..].iter_mut().map(|at| &mut at.fit));
         Ok(fits)
     };
     tree.indices().par_chunks(PART).map_init(Search::new, of_part).collect()

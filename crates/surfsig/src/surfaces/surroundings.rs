@@ -1,7 +1,7 @@
 //! What is around each point: its neighbours, and the surface through its nearest points.
 
 use super::graph::{Graph, NEIGHBOURS, Neighbours};
-use super::local_fits::{LocalFit, fit_nearest};
+use super::local_fits::{FitAt, LocalFit, fit_nearest};
 use crate::kd_tree::KdTree;
 use crate::statistics::upper_median;
 use crate::{Error, Monitor};
@@ -42,7 +42,7 @@ impl Surroundings {
             let fewest = NEIGHBOURS * stride + 1;
             let take = |point: u32, nearest: &[(f64, u32)]| Neighbours::of(point, nearest, stride);
             let found = fit_nearest(tree, positions, &is_asked, neighbours * stride, fewest, &take, monitor)?;
-            for (point, fit, neighbours) in found.into_iter().flatten() {
+            for FitAt { point, fit, taken: neighbours } in found.into_iter().flatten() {
                 fits[point as usize] = fit;
                 graph.connect(point, neighbours);
             }
@@ -80,7 +80,7 @@ pub(super) fn fits_at(
     let is_asked = |point: u32| is_asked[point as usize];
     let found = fit_nearest(&tree, positions, &is_asked, neighbours, 0, &|_, _| (), monitor)?;
     let mut fits = vec![LocalFit::MISSING; some.len()];
-    for (point, fit, ()) in found.into_iter().flatten() {
+    for FitAt { point, fit, .. } in found.into_iter().flatten() {
         fits[some.partition_point(|&other| other < point)] = fit;
     }
     Ok(fits)
