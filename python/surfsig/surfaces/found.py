@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,17 +17,16 @@ from surfsig.point_cloud import PointCloud
 from surfsig.shapes.surface import Surface
 from surfsig.surfaces.classes import PointClass, classify, deviations_of
 from surfsig.surfaces.export import export
-from surfsig.surfaces.pipe_runs import PipeRun, find_pipe_runs
 from surfsig.surfaces.report import report_html
-from surfsig.surfaces.table import table_columns, write_csv, write_excel
-from surfsig.surfaces.wording import HEADER, summary_of, table_rows
+from surfsig.surfaces.surface_list import SurfaceList
+from surfsig.surfaces.wording import summary_of
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Surfaces:
+class Surfaces(SurfaceList[Surface]):
     """The surfaces of a scan, the one with most points first; a sequence of `Surface`."""
 
     cloud: PointCloud
@@ -41,16 +39,6 @@ class Surfaces:
     """The standard deviation of the points' distances that was asked for; None where it was estimated."""
     threads: int | None = None
     """Threads that were asked for."""
-
-    def __len__(self) -> int:
-        """Return the number of surfaces."""
-        return len(self.surfaces)
-
-    def __iter__(self) -> Iterator[Surface]:
-        return iter(self.surfaces)
-
-    def __getitem__(self, number: int) -> Surface:
-        return self.surfaces[number]
 
     def __repr__(self) -> str:
         return f"Surfaces({self.summary()})"
@@ -115,16 +103,6 @@ class Surfaces:
             return f"no surface found: {self._why_none()}"
         return summary_of(self.surfaces, float((self.labels >= 0).mean()), len(self.cloud))
 
-    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Describe the surfaces for people, in sensible digits.
-
-        Returns
-        -------
-        The names of the columns, and a row for each surface: its number, kind, radius, the radius's 95 %
-        interval, size, area, number of points, rms.
-        """
-        return HEADER, table_rows(self)
-
     @property
     def colors(self) -> NDArray[np.uint8]:
         """A colour for each point, (n, 3): red, green and blue of its surface, grey for none."""
@@ -146,78 +124,6 @@ class Surfaces:
             "confidence": self.confidence,
             "deviation": self._deviations.astype(np.float32),
         }
-
-    def to_pandas(self) -> pd.DataFrame:
-        """Give the surfaces as a pandas DataFrame, a row each; the index has their numbers.
-
-        Returns
-        -------
-        pandas.DataFrame
-            kind, radius, radius_std, radius_low, radius_high, major_radius, half_angle, center_x, ...,
-            axis_x, ..., length, width, arc, area, count, rms.
-
-        Raises
-        ------
-        InvalidInputError
-            If pandas is not installed.
-        """
-        from surfsig.convert.libraries import library
-
-        pandas = library("pandas", "pandas", "pandas")
-        return pandas.DataFrame(table_columns(self.surfaces))
-
-    def write_csv(self, path: str | Path) -> None:
-        """Write the table of `to_pandas` as text with commas, the surfaces' numbers first.
-
-        A value that a kind does not have is left empty. The file is whole or as it was before.
-
-        Parameters
-        ----------
-        path
-            Where to write.
-
-        Raises
-        ------
-        OSError
-            If it cannot be written.
-        """
-        write_csv(self.surfaces, path)
-
-    def write_excel(self, path: str | Path) -> None:
-        """Write the table of `to_pandas` as an Excel workbook (.xlsx), the surfaces' numbers first.
-
-        Needs XlsxWriter (`pip install surfsig[excel]`). A value that a kind does not have is an empty cell.
-        The file is whole or as it was before.
-
-        Parameters
-        ----------
-        path
-            Where to write.
-
-        Raises
-        ------
-        InvalidInputError
-            If XlsxWriter is not installed.
-        OSError
-            If it cannot be written.
-        """
-        write_excel(self.surfaces, path)
-
-    def pipe_runs(self) -> list[PipeRun]:
-        """Join the pipes: cylinders of equal radius, end to end.
-
-        Two ends are joined by a torus of the same radius whose circle touches both axes (an elbow), where
-        the axes meet near both ends (a corner: an elbow that is hidden or too short to be found), or where
-        two pieces lie in line. Radii are equal if they differ insignificantly (99 %) or by less than 3 %.
-        Near is within four diameters, which is farther than most elbows and flanges reach; a pipe that goes
-        on past the joint, as at a tee, is not joined there.
-
-        Returns
-        -------
-        list of PipeRun
-            Runs of two segments or more, the longest first; lengths in the scan's unit.
-        """
-        return find_pipe_runs(self.surfaces)
 
     def export(self, path: str | Path) -> None:
         """Write the bounded surfaces as meshes: GLB, OBJ or DXF, by the path's ending.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,18 +16,19 @@ from surfsig.files.atomic import replacing
 from surfsig.files.json_text import json_text
 from surfsig.point_cloud import PointCloud
 from surfsig.shapes.surface import PARAMETERS
-from surfsig.surfaces.pipe_runs import PipeRun, find_pipe_runs
-from surfsig.surfaces.table import table_columns, write_csv, write_excel
-from surfsig.surfaces.wording import HEADER, summary_of, table_rows
+from surfsig.surfaces.pipe_runs import find_pipe_runs
+from surfsig.surfaces.surface_list import SurfaceList
+from surfsig.surfaces.table import table_columns, write_csv
+from surfsig.surfaces.wording import summary_of
 from surfsig.tiles.dataset import TileDataset
 from surfsig.tiles.manifest import TABLES
 from surfsig.tiles.surface_parts import TileSurface, surface_of
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 
-class TileSurfaces:
+class TileSurfaces(SurfaceList[TileSurface]):
     """The surfaces that `find_surfaces_tiles` found, the one with most points first; a sequence of `Surface`.
 
     Parameters
@@ -60,16 +61,6 @@ class TileSurfaces:
             raise InvalidInputError(f"{path}: is no table of surfaces of this version") from None
         self.tiles = TileDataset(folder)
 
-    def __len__(self) -> int:
-        """Return the number of surfaces."""
-        return len(self.surfaces)
-
-    def __iter__(self) -> Iterator[TileSurface]:
-        return iter(self.surfaces)
-
-    def __getitem__(self, number: int) -> TileSurface:
-        return self.surfaces[number]
-
     def __repr__(self) -> str:
         return f"TileSurfaces({self.summary()})"
 
@@ -82,24 +73,6 @@ class TileSurfaces:
             For instance "7 surfaces: 6 planes, 1 sphere; 98.2 % of 12,000 points".
         """
         return _summary(self.surfaces, len(self.tiles))
-
-    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Describe the surfaces for people, as `Surfaces.table` does.
-
-        Returns
-        -------
-        The names of the columns, and a row for each surface.
-        """
-        return HEADER, table_rows(self.surfaces)
-
-    def pipe_runs(self) -> list[PipeRun]:
-        """Join the pipes, as `Surfaces.pipe_runs` does.
-
-        Returns
-        -------
-        list of PipeRun
-        """
-        return find_pipe_runs(self.surfaces)
 
     def read(self, box: ArrayLike | None = None) -> PointCloud:
         """Read the points in a box with all columns, as `TileDataset.read` does.
@@ -119,54 +92,6 @@ class TileSurfaces:
             If a part that has points there is missing or broken.
         """
         return self.tiles.read(box)
-
-    def to_pandas(self) -> pd.DataFrame:
-        """Give the surfaces as a pandas DataFrame, as `Surfaces.to_pandas` does.
-
-        Returns
-        -------
-        pandas.DataFrame
-
-        Raises
-        ------
-        InvalidInputError
-            If pandas is not installed.
-        """
-        from surfsig.convert.libraries import library
-
-        return library("pandas", "pandas", "pandas").DataFrame(table_columns(self.surfaces))
-
-    def write_csv(self, path: str | Path) -> None:
-        """Write the table as text with commas, as `Surfaces.write_csv` does.
-
-        Parameters
-        ----------
-        path
-            Where to write.
-
-        Raises
-        ------
-        OSError
-            If it cannot be written.
-        """
-        write_csv(self.surfaces, path)
-
-    def write_excel(self, path: str | Path) -> None:
-        """Write the table as an Excel workbook, as `Surfaces.write_excel` does.
-
-        Parameters
-        ----------
-        path
-            Where to write.
-
-        Raises
-        ------
-        InvalidInputError
-            If XlsxWriter is not installed.
-        OSError
-            If it cannot be written.
-        """
-        write_excel(self.surfaces, path)
 
 
 def write_tables(out: Path, values: Sequence[Mapping[str, Any]], points: int) -> None:
