@@ -12,14 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfsig._surfsig import FLAT_ATOM_NOISES, Frame
+from surfsig._surfsig import Frame
 from surfsig.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from surfsig.extraction import Extraction
-
-ROUNDING = float(np.finfo(np.float32).eps)
-"""Noise of the mean curvature, in patch units, that heights in float32 have at least."""
 
 MEDIAN_TO_STD = 1.4826
 """Standard deviations of a normal error for each median of its size."""
@@ -82,11 +79,8 @@ def flat_atom_length(*extractions: Extraction, flat: bool = False, frame: Frame 
         raise InvalidInputError("the length of the flat atom follows the noise of one extraction or more")
     noise = max(_noise_in_patch_units(extraction, flat) for extraction in extractions)
     frame = Frame.default() if frame is None else frame
-    k = np.array([max(noise, ROUNDING)], np.float32)
-    # A paraboloid that is bent by noise: its signature is linear in a small H, and does not notice K.
-    rows, _ = frame.signatures_of_curvatures(k, k, side=1.0)
-    length = FLAT_ATOM_NOISES * float(np.linalg.norm(rows[0]))
-    if not np.isfinite(length):
+    length = frame.flat_atom_length(noise)
+    if length is None:
         raise InvalidInputError("the noise is beyond the vocabulary: take a larger radius")
     return length
 

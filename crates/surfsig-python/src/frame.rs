@@ -252,6 +252,21 @@ impl Frame {
         })
     }
 
+    /// The flat atom's length for signatures of this noise.
+    ///
+    /// Parameters
+    /// ----------
+    /// noise : float
+    ///     Standard error of the mean curvature where the patch's side is 1.
+    ///
+    /// Returns
+    /// -------
+    /// float or None
+    ///     None where the noise is beyond the vocabulary's end.
+    fn flat_atom_length(&self, noise: f64) -> Option<f64> {
+        self.get().flat_atom_length(noise)
+    }
+
     /// Signatures of surfaces in the sensor's axes.
     ///
     /// Parameters

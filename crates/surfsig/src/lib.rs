@@ -81,8 +81,8 @@ pub use curvature::{ALPHA, GRID, MeanCurvatureFormula, Paraboloid};
 pub use depth_image::{DepthImage, Judgement, SurfacePlace};
 pub use error::Error;
 pub use extract::{
-    Column, ExtractOptions, Extraction, FEWEST_AUTO_POINTS, FLAT_ATOM_NOISES, NearestDistances, Neighborhood,
-    PartSize, Queries, WholeCloud, different_places, distance_to_nearest, extract, extract_auto_radius,
+    Column, ExtractOptions, Extraction, FEWEST_AUTO_POINTS, NearestDistances, Neighborhood, PartSize,
+    Queries, WholeCloud, different_places, distance_to_nearest, extract, extract_auto_radius,
     extract_monitored, extract_part, extract_radii, sampled_numbers, voxel_representatives,
 };
 pub use field::{
@@ -94,7 +94,7 @@ pub use finding::{FIND_STEPS_PER_MODEL, FindSettings, Instance, MODEL_STEPS, Mod
 pub use fit::{
     Cylinder, FitAxes, FitKind, FitUsed, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere,
 };
-pub use frame::{Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};
+pub use frame::{FLAT_ATOM_NOISES, Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};
 pub use geometry::{RigidTransform, TransformError};
 pub use kd_tree::KdTree;
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};

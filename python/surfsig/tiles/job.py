@@ -216,10 +216,10 @@ class TileRun:
     def write_parts(self, task: TileTask, what: str) -> list[Record]:
         """Run the task that writes parts on all tiles that are not done, and keep the manifest.
 
-        Raises
-        ------
-        TilesFailedError
-            At the end, if a tile failed.
+        Returns
+        -------
+        list of dict
+            The records of all tiles in their order, also of those that failed.
         """
         out, number = self.job.out, len(self.source.plan)
         records = finished_records(out, range(number)) | self.failed

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from distributed import Client
 
 HALO_NEIGHBORS = 1000
-"""A halo is as wide as it is far to so many nearest points: the surroundings by which noise is
-when surfaces grow."""
+"""A halo is as wide as it is far to so many nearest points: the core judges noise by as many points around a
+place."""
 
 MARGIN = 1.1
 """By how much it is wider, as density differs from place to place."""

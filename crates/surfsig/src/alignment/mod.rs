@@ -37,7 +37,7 @@ pub(crate) use halves::{halves, systematic_covariance};
 pub(crate) use least_squares::{LinearisedDistances, solve_determined};
 pub use observability::{FreeDirection, free_directions};
 pub(crate) use open_covariance::{
-    infinite_along, information_without, motions_beyond, orthonormal, unscaled,
+    infinite_along, information_without, lengths, motions_beyond, orthonormal, unscaled,
 };
 pub(crate) use point_to_plane::{FACING_AWAY, OrientedSurface, cosine_towards, transformed};
 pub use point_to_surface::PointToSurfaceSettings;

@@ -16,10 +16,10 @@ const UNDETERMINED: f64 = 1e-12;
 ///
 /// `unit` is the length by which a rotation moves points, per radian.
 pub(crate) fn infinite_along(covariance: &Matrix6<f64>, motions: &[Vector6<f64>], unit: f64) -> Matrix6<f64> {
-    let (finite, open) = separated(covariance, motions, unit);
     if motions.is_empty() {
         return *covariance;
     }
+    let (finite, open) = separated(covariance, motions, unit);
     let lengths = lengths(unit);
     Matrix6::from_fn(|i, j| {
         if open[(i, j)].abs() < NO_PART {
@@ -78,7 +78,8 @@ pub(crate) fn unscaled(motion: &Vector6<f64>, unit: f64) -> Vector6<f64> {
     Vector6::from_fn(|k, _| if k < 3 { motion[k] / unit } else { motion[k] })
 }
 
-fn lengths(unit: f64) -> Matrix6<f64> {
+/// What gives rotations as lengths.
+pub(crate) fn lengths(unit: f64) -> Matrix6<f64> {
     Matrix6::from_diagonal(&Vector6::from_fn(|k, _| if k < 3 { unit } else { 1.0 }))
 }
 

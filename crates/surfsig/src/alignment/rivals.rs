@@ -17,13 +17,18 @@ pub(crate) trait FittedSurface: Sync {
     fn closeness(&self, moved: &[[f64; 3]]) -> Closeness;
 }
 
-/// From when on a source counts as larger or smaller than the target.
+/// From when on a source counts as larger or smaller than the target. By default the logarithm of its scale must be half a
+/// hundredth, as ranges of sensors differ by a thousandth, and differ from 0 by four standard errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ScaleLimits {
     /// Logarithm of the scale.
     pub doubted: f64,
     /// The same in its standard errors.
     pub deviations: f64,
+}
+
+impl ScaleLimits {
+    pub const DEFAULT: Self = Self { doubted: 0.005, deviations: 4.0 };
 }
 
 /// A target's surface with the distance up to which points count.

@@ -7,15 +7,6 @@ use crate::statistics::median;
 use crate::{FitAxes, Status};
 use rayon::prelude::*;
 
-/// Length of the flat atom, in lengths of a signature of pure noise: 2.576 sqrt(2) / acos(0.9).
-///
-/// The signatures of two planes, of noise n and flat atom L, make the angle atan(h1 / L) - atan(h2 / L) with normal
-/// h1, h2 of standard deviation n; with this length it is within acos(0.9), zeta 0.9 or more, in 99 of 100 pairs.
-pub const FLAT_ATOM_NOISES: f64 = 8.077_156_482_481_387;
-
-/// Noise of the mean curvature, in patch units, that heights in float32 have at least.
-const ROUNDING: f64 = f32::EPSILON as f64;
-
 /// Signatures that a thread makes at a time: half a megabyte.
 const PART: usize = 512;
 
@@ -34,12 +25,7 @@ impl Extraction {
     pub fn flat_atom_length(&self, frame: &Frame) -> Option<f64> {
         let in_patch_units = |i: usize| 2.0 * self.radius_of(i) * f64::from(self.mean_curvature_std[i]);
         let noises = (0..self.len()).map(in_patch_units).filter(|noise| noise.is_finite()).collect();
-        let noise = median(noises)?.max(ROUNDING) as f32;
-        // A paraboloid that is bent by noise: its signature is linear in a small H, and does not notice K.
-        let mut row = [[0.0; SIGNATURE]];
-        frame.signatures_of_curvatures(1.0, &[[noise, noise]], &mut row, &mut [Status::Ok]);
-        let length = FLAT_ATOM_NOISES * norm(&row[0]);
-        length.is_finite().then_some(length)
+        frame.flat_atom_length(median(noises)?)
     }
 
     /// zeta of eq. (12) of each query with one of them, both with a flat atom of this length, or without one where
@@ -106,10 +92,6 @@ impl Extraction {
 /// A signature and one more coordinate, the same for all surfaces.
 fn with_flat_atom(row: &[f32; SIGNATURE], length: f64) -> Vec<f32> {
     row.iter().copied().chain([length as f32]).collect()
-}
-
-fn norm(row: &[f32]) -> f64 {
-    row.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>().sqrt()
 }
 
 #[cfg(test)]

@@ -15,7 +15,6 @@ mod shares;
 mod whole_cloud;
 mod worker;
 
-pub use alike::FLAT_ATOM_NOISES;
 pub use auto_radius::{FEWEST_AUTO_POINTS, extract_auto_radius};
 pub use extraction::{Column, Extraction};
 pub use neighborhood::{

@@ -1,6 +1,6 @@
 //! How instances are searched and judged.
 
-use crate::alignment::{PointToSurfaceSettings, RivalSettings};
+use crate::alignment::{PointToSurfaceSettings, RivalSettings, ScaleLimits};
 
 /// What an expert may change; nothing has to be set. Lengths in voxels are in those of the scene's surface.
 /// `benchmarks/sweep_settings.py` shows what other values give on simulated scenes.
@@ -118,8 +118,8 @@ impl Default for FindSettings {
             rivals: RivalSettings::default(),
             rival_distance: 0.55,
             rival_deficit: 0.15,
-            doubted_scale: 0.005,
-            scale_deviations: 4.0,
+            doubted_scale: ScaleLimits::DEFAULT.doubted,
+            scale_deviations: ScaleLimits::DEFAULT.deviations,
             threads: None,
         }
     }

@@ -1,10 +1,12 @@
 //! The frame F of section II: its atoms, its check, and its inverse.
 
+mod flat_atom;
 mod parameters;
 mod singular;
 mod symmetry;
 mod table;
 
+pub use flat_atom::FLAT_ATOM_NOISES;
 pub use parameters::{FrameParameters, Levels};
 
 use crate::curvature::{ALPHA, Paraboloid};

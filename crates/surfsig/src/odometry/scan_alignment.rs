@@ -7,8 +7,8 @@ use super::settings::ScanAlignmentSettings;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
 use crate::alignment::{
-    FreeDirection, GicpSettings, Rivals, blocks, clustered_covariance, gicp_with, halves, orthonormal,
-    solve_determined, systematic_covariance, unscaled,
+    FreeDirection, GicpSettings, Rivals, blocks, clustered_covariance, gicp_with, halves, lengths,
+    orthonormal, solve_determined, systematic_covariance, unscaled,
 };
 use crate::random::some_of;
 use crate::statistics::{DEVIATIONS_PER_MEDIAN, median};
@@ -125,7 +125,7 @@ fn without_motion(
     unit: f64,
 ) -> RigidTransform {
     let twist = Vector6::from((start.inverse() * *pose).log());
-    let scaled = Vector6::from_fn(|k, _| if k < 3 { unit * twist[k] } else { twist[k] });
+    let scaled = lengths(unit) * twist;
     let rest = motions.iter().fold(scaled, |rest, motion| rest - motion * motion.dot(&rest));
     *start * RigidTransform::exp(unscaled(&rest, unit).into())
 }
@@ -236,9 +236,8 @@ impl PointToPlane {
     /// Makes steps leave out unit motions, which have rotations in units of `unit`.
     fn fix(&mut self, motions: &[Vector6<f64>], unit: f64) {
         let weight = FIXED * self.residuals.len() as f64;
-        let lengths = Matrix6::from_diagonal(&Vector6::from_fn(|k, _| if k < 3 { unit } else { 1.0 }));
         for motion in motions {
-            let row = lengths * motion;
+            let row = lengths(unit) * motion;
             self.information += row * row.transpose() * weight;
         }
     }

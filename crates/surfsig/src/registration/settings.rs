@@ -1,6 +1,6 @@
 //! How scans are registered.
 
-use crate::alignment::{ConsensusSettings, PointToSurfaceSettings, RivalSettings};
+use crate::alignment::{ConsensusSettings, PointToSurfaceSettings, RivalSettings, ScaleLimits};
 
 /// What an expert may change; nothing has to be set. `benchmarks/sweep_settings.py` shows what other values give on
 /// simulated scenes.
@@ -102,8 +102,8 @@ impl Default for RegistrationSettings {
                 ..PointToSurfaceSettings::default()
             },
             free_space: FreeSpaceSettings::default(),
-            doubted_scale: 0.005,
-            scale_deviations: 4.0,
+            doubted_scale: ScaleLimits::DEFAULT.doubted,
+            scale_deviations: ScaleLimits::DEFAULT.deviations,
             trusted_inliers: 32,
             certain_inliers: 8,
             certain_explained: 0.5,
