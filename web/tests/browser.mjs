@@ -74,7 +74,7 @@ export async function open(browser, options = {}, address = pathToFileURL(PAGE).
 }
 
 /** Waits until nothing runs and the points are coloured by something. */
-export async function settled(page, quantity = null) {
+export async function finished(page, quantity = null) {
   await page.waitForFunction((wanted) => {
     const [running, chosen] = [document.querySelector("#progress"), document.querySelector("#quantity")];
     const known =
@@ -85,7 +85,7 @@ export async function settled(page, quantity = null) {
 
 export async function openSample(page, id) {
   await page.click(`[data-sample=${id}]`);
-  await settled(page, "mean_curvature");
+  await finished(page, "mean_curvature");
 }
 
 /** Clicks a button that saves, and keeps the file. */

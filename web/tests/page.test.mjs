@@ -16,7 +16,7 @@ import {
   picture,
   reference,
   saved,
-  settled,
+  finished,
 } from "./browser.mjs";
 
 /** The engine multiplies and adds in two roundings: curvatures differ by at most this share of max(|k|, 1/r). */
@@ -74,7 +74,7 @@ describe("the page in Chromium", { concurrency: 2, skip: reason !== null && reas
     await openSample(page, "parts");
     const view = await page.locator("#view").boundingBox();
     await page.mouse.click(view.x + 0.29 * view.width, view.y + 0.5 * view.height);
-    await settled(page, "zeta");
+    await finished(page, "zeta");
     await page.waitForSelector("#alike");
     await page.keyboard.down("Shift");
     await page.mouse.click(view.x + 0.69 * view.width, view.y + 0.5 * view.height);
@@ -89,7 +89,7 @@ describe("the page in Chromium", { concurrency: 2, skip: reason !== null && reas
 
     await page.click("#find");
     await page.waitForSelector("#surface-table");
-    await settled(page, "surface");
+    await finished(page, "surface");
     const rows = page.locator("#surface-table tbody tr");
     await rows.nth(1).click();
     await rows.nth(2).click({ modifiers: ["Shift"] });
@@ -126,7 +126,7 @@ describe("the page in Chromium", { concurrency: 2, skip: reason !== null && reas
     for (const name of names) {
       await page.setInputFiles("#file", path.join(files, name));
       await page.getByText(name, { exact: true }).waitFor();
-      await settled(page, "mean_curvature");
+      await finished(page, "mean_curvature");
       savedFiles.push(await saved(page, "#save-ply", path.join(files, `saved_${name}.ply`)));
     }
     reference("saved", ...savedFiles).forEach((back, number) => {
@@ -157,7 +157,7 @@ describe("the page in Chromium", { concurrency: 2, skip: reason !== null && reas
     });
     await page.dispatchEvent("#stage-area", "drop", { dataTransfer: data });
     await page.getByText("dropped.xyz", { exact: true }).waitFor();
-    await settled(page, "mean_curvature");
+    await finished(page, "mean_curvature");
     assert.deepEqual(wrong, []);
     await page.close();
   });
@@ -168,7 +168,7 @@ describe("the page in Chromium", { concurrency: 2, skip: reason !== null && reas
     assertCurvature(await saved(page, "#save-ply", path.join(folder(context), "saved.ply")), "0.2");
     await page.locator("#radius").focus();
     await page.keyboard.press("ArrowRight");
-    await settled(page, "mean_curvature");
+    await finished(page, "mean_curvature");
     const radius = await page.locator("#radius-value").textContent();
     await page.selectOption("#quantity", "class");
     await picture(page, "class");
@@ -176,12 +176,12 @@ describe("the page in Chromium", { concurrency: 2, skip: reason !== null && reas
     const linked = page.url();
     await page.goto("about:blank");
     await page.goto(linked);
-    await settled(page, "class");
+    await finished(page, "class");
     assert.equal(await page.locator("#radius-value").textContent(), radius);
     await page.check("#auto");
     await page.waitForSelector("#progress:not([hidden])");
     await page.click("#stop");
-    await settled(page);
+    await finished(page);
     assert.equal(await page.locator("#message").isVisible(), false);
     await page.keyboard.press("Escape");
     await page.locator("#view").focus();
