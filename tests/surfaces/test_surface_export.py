@@ -203,6 +203,22 @@ def test_what_cannot_be_exported_is_refused_before_the_work(
     assert [path.name for path in tmp_path.iterdir()] == ["scan.ply"]
 
 
+@pytest.mark.parametrize("kind", ["sphere", "cylinder"])
+def test_a_radius_that_is_not_determined_has_a_patch(kind: str) -> None:
+    rng = np.random.default_rng(5)
+    x, y = rng.uniform(-0.5, 0.5, (2, 2000))
+    bow = x**2 if kind == "cylinder" else x**2 + y**2
+    points = np.column_stack([x, y, -bow / (2.0 * 200.0)]) + rng.normal(0.0, 0.01, (2000, 3)) + 7.0
+    surface = surfsig.fit_sphere(points) if kind == "sphere" else surfsig.fit_cylinder(points, axis=(0, 1, 0))
+    assert math.isnan(surface.radius)
+    assert not surface.radius_determined
+    patch = surface.patch(points)
+    assert np.abs(surface.distances(patch.vertices + patch.origin)).max() < 1e-9
+    # Counted from where it is, and not from a center that may be anywhere.
+    assert np.abs(patch.vertices).max() < 1.0
+    assert patch.area == pytest.approx(1.0, rel=0.1)
+
+
 def test_the_shell_exports(shell: Shell, found: Surfaces, tmp_path: Path) -> None:
     pytest.importorskip("trimesh")
     scan = tmp_path / "scan.ply"

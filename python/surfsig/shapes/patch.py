@@ -52,7 +52,7 @@ class SurfacePatch:
 
     origin: Array
     """(3,): where the vertices are counted from, so that they keep their digits far from 0: the surface's
-    `center`."""
+    `center`, or where the radius is not determined, which may put that far away, the vertices' mean."""
     vertices: Array
     """(v, 3), less the origin; all are on the surface."""
     faces: Faces
@@ -98,8 +98,6 @@ def patch_of(surface: Surface, cloud: PointCloud) -> SurfacePatch:
     """Make the mesh; see `Surface.patch`."""
     if surface.kind in ("circle", "line"):
         raise InvalidInputError(f"a {surface.kind} has no area, and so no patch")
-    if not surface.radius_determined:
-        raise InvalidInputError(f"the radius of the {surface.kind} is not determined, and so it has no patch")
     offset = surface.center - surface.point
     points = member_points(surface, cloud) + offset
     chart = _chart(surface, points)
@@ -120,20 +118,20 @@ def patch_of(surface: Surface, cloud: PointCloud) -> SurfacePatch:
             corners[..., column] %= grid.count * fine
     lattice, numbers = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
     along = [grid.start + grid.step / fine * lattice[:, i] for i, grid in enumerate((first, second))]
-    return SurfacePatch(
-        surface.center, chart.lifted(*along) - offset, numbers.reshape(-1, 3).astype(np.int64)
-    )
+    vertices = chart.lifted(*along) - offset
+    middle = np.zeros(3) if surface.radius_determined else vertices.mean(axis=0)
+    return SurfacePatch(surface.center + middle, vertices - middle, numbers.reshape(-1, 3).astype(np.int64))
 
 
 def _wide_sphere(surface: Surface, points: Array, side: float) -> SurfacePatch:
     """Mesh a sphere without a map, which would be torn at its rim."""
-    steps = [side / surface.radius * 2.0 ** (0.5 * power) for power in range(_WIDTHS)]
+    steps = [side / surface.fitted_radius * 2.0 ** (0.5 * power) for power in range(_WIDTHS)]
     tried = [(*sphere_with_points(points, step), -step) for step in steps]
     enough = [mesh for mesh in tried if mesh[2] >= _COVERED]
     vertices, faces, _, step = enough[0] if enough else max(tried, key=lambda mesh: mesh[2:])
     for _ in range(_halvings(-step)):
         vertices, faces = halved(vertices, faces)
-    return SurfacePatch(surface.center, surface.radius * vertices, faces)
+    return SurfacePatch(surface.center, surface.fitted_radius * vertices, faces)
 
 
 def _halvings(bend: float) -> int:
@@ -163,7 +161,7 @@ def _chart(surface: Surface, points: Array) -> _Chart:
     placement, axis = surface._placement, surface.axis
     first, second = axes_across(axis)
     angles, heights, away = placement.turns(points), placement.heights(points), placement.away(points)
-    radius, major, slope = surface.radius, surface.major_radius, math.tan(surface.half_angle)
+    radius, major, slope = surface.fitted_radius, surface.major_radius, math.tan(surface.half_angle)
 
     def around(angle: Array, distance: Array | float, height: Array) -> Array:
         outward = np.outer(np.cos(angle), first) + np.outer(np.sin(angle), second)
@@ -214,7 +212,7 @@ def _plane_chart(surface: Surface, points: Array) -> _Chart:
 
 def _sphere_chart(surface: Surface, points: Array) -> _Chart:
     """Take Lambert's azimuthal map about the middle of the points; its rim is the opposite point."""
-    radius, middle = surface.radius, middle_direction(directions_of(points))
+    radius, middle = surface.fitted_radius, middle_direction(directions_of(points))
     axes = np.stack(axes_across(middle))
 
     def lifted(x: Array, y: Array) -> Array:

@@ -274,7 +274,8 @@ class Surface:
 
         On a map of the surface, cells are joined where they have points. They are as wide as it is far to 32
         neighbours, or up to four times that where points are in rows or clusters; holes and outlines are as
-        fine as these cells.
+        fine as these cells. Where the radius is not determined, the patch has `fitted_radius`: within the
+        points' noise it is the same.
 
         Parameters
         ----------
@@ -289,8 +290,7 @@ class Surface:
         Raises
         ------
         InvalidInputError
-            If the cloud has fewer points than the surface was fitted to, or it is a circle or a line, or its
-            radius is not determined.
+            If the cloud has fewer points than the surface was fitted to, or it is a circle or a line.
         """
         return patch_of(self, PointCloud.of(cloud))
 
