@@ -183,8 +183,8 @@ def read_arguments() -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
-        "--seeds", type=int, nargs=2, default=(1000, 1100), metavar=("FIRST", "END"),
-        help="the scenes' seeds, without END (default: 1000 1100)",
+        "--seeds", type=int, nargs=2, default=(2000, 2050), metavar=("FIRST", "END"),
+        help="the scenes' seeds, without END (default: 2000 2050)",
     )  # fmt: skip
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
     parser.add_argument("--write", action="store_true", help="update BENCHMARKS.md")

@@ -170,7 +170,7 @@ def in_tiles(paths: Sequence[Path], out: Path, memory: str, tiles: int | None = 
 def today_row(points: int, folder: Path, paths: Sequence[Path]) -> Row:
     """Measure what users of jakteristics do with the files, where it is installed."""
     try:
-        import jakteristics  # type: ignore[import-not-found]  # noqa: F401
+        import jakteristics  # type: ignore[import-not-found, import-untyped, unused-ignore]  # noqa: F401
     except ModuleNotFoundError:
         return (f"{points:,}", "not measured: jakteristics is not installed", "", "", "")
     found = measured("today", folder / "today", *paths)

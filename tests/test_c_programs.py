@@ -64,6 +64,10 @@ int main() {
               nearest.indices().size() == nearest.size(), own.indices().size(), own.radii().size());
   std::printf("%.1f %d %d %zu\\n", own.normals()[2], own.oriented(), nearest.oriented(),
               own.fit_used().size());
+  const auto all = surfsig::extract(cloud, 0.55, surfsig::Options().all());
+  const auto alike = all.similarities(464, all.flat_atom_length());
+  std::printf("%.3f %d %zu %.3f %.3f\\n", cloud.spacing(), all.flat_atom_length() > 0.0, alike.size(),
+              alike[464], alike[435]);
 
   surfsig::SurfaceOptions stopping;
   stopping.progress([](std::size_t, std::size_t) -> bool { throw std::logic_error("thrown by the caller"); });
@@ -133,7 +137,7 @@ def lattice_points_within(steps: float) -> int:
 
 @pytest.mark.parametrize("standard", ["c++14", "c++20"])
 def test_a_program_in_cpp(installed: Path, tmp_path: Path, standard: str) -> None:
-    one, none, refused, counts, own, thrown, plane, kept, flat, moved, back = output_of(
+    one, none, refused, counts, own, alike, thrown, plane, kept, flat, moved, back = output_of(
         tmp_path / "main.cpp", IN_CPP, installed, "c++", standard
     )
     assert one == f"1 {lattice_points_within(5.5)} 1.000"
@@ -141,6 +145,7 @@ def test_a_program_in_cpp(installed: Path, tmp_path: Path, standard: str) -> Non
     assert refused == "1 query 1 is outside an extraction of 1 queries"
     assert counts == f"{lattice_points_within(2.5)} {lattice_points_within(4.5)} 9 1 0 1"
     assert own == "-1.0 1 0 0"
+    assert alike == "0.100 1 900 1.000 1.000"
     assert thrown == "thrown by the caller"
     assert plane == "1 9 1.0 9 0.0 0"
     assert kept == "1.0 0.0"

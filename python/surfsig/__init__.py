@@ -50,6 +50,7 @@ from surfsig.files import (
 )
 from surfsig.finding import Instance, Instances, Library, LibraryEntry, find_instances
 from surfsig.flat_atom import flat_atom_length
+from surfsig.mapping import Loop, LoopClosure, close_loops, fuse_scans
 from surfsig.missing_returns import remove_missing_returns
 from surfsig.odometry import Odometry, ScanStatus, estimate_odometry
 from surfsig.point_cloud import PointCloud
@@ -119,6 +120,8 @@ __all__ = [
     "InvalidInputError",
     "Library",
     "LibraryEntry",
+    "Loop",
+    "LoopClosure",
     "MultiwayRegistration",
     "Odometry",
     "OdometrySettings",
@@ -151,6 +154,7 @@ __all__ = [
     "TimedScan",
     "Trajectory",
     "__version__",
+    "close_loops",
     "crop",
     "downsample",
     "estimate_odometry",
@@ -172,6 +176,7 @@ __all__ = [
     "fit_torus",
     "flat_atom_length",
     "flip_signatures",
+    "fuse_scans",
     "map_tiles",
     "match_fields",
     "open",

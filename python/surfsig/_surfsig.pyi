@@ -21,6 +21,7 @@ __all__ = [
     "E57Reader",
     "FindSettings",
     "Frame",
+    "FusedMap",
     "Odometry",
     "OdometrySettings",
     "PieceView",
@@ -801,6 +802,19 @@ class Odometry:
     def __len__(self) -> int: ...
     @property
     def voxel(self) -> float | None: ...
+    def arrays(self) -> dict[str, NDArray[Any]]: ...
+
+@final
+class FusedMap:
+    def __new__(cls, voxel: float) -> FusedMap: ...
+    def add(
+        self,
+        points: NDArray[np.floating],
+        *,
+        origin: Sequence[float],
+        T_map_scan: Sequence[Sequence[float]],
+        viewpoint: Sequence[float],
+    ) -> None: ...
     def arrays(self) -> dict[str, NDArray[Any]]: ...
 
 @final

@@ -92,6 +92,8 @@ public:
       : Cloud(points.size() == 0 ? nullptr : &points.data()->x, points.size(), sizeof(*points.data()),
               origin) {}
   std::size_t size() const { return surfsig_cloud_size(get()); }
+  /** Median distance of a point to its nearest other one; a radius of 5 to 10 times that is a start. */
+  double spacing() const { return surfsig_cloud_spacing(get()); }
   const surfsig_cloud *get() const { return handle_.get(); }
 
 private:
@@ -186,6 +188,14 @@ public:
     surfsig_status *const why = statuses != nullptr ? statuses->data() : nullptr;
     check(surfsig_signatures(get(), queries.data(), queries.size(), rows.front().data(), why));
     return rows;
+  }
+  /** A length for similarities(), by which what is flat within its error differs from the slightly curved. */
+  double flat_atom_length() const { return surfsig_flat_atom_length(get()); }
+  /** zeta of all queries with one of them: where else its surface is; NaN where there is no signature. */
+  std::vector<float> similarities(std::uint32_t query, double flat_atom = 0.0) const {
+    std::vector<float> zeta(size());
+    check(surfsig_similarities(get(), query, flat_atom, zeta.data()));
+    return zeta;
   }
   const surfsig_extraction *get() const { return handle_.get(); }
 

@@ -5,6 +5,7 @@ mod extract;
 mod field;
 mod finding;
 mod frame;
+mod fused_map;
 mod neighbor_distances;
 mod odometry;
 mod primitive;
@@ -71,6 +72,8 @@ mod _surfsig {
     use crate::finding::{FindSettings, find_instances, point_spacing, prepare_model};
     #[pymodule_export]
     use crate::frame::Frame;
+    #[pymodule_export]
+    use crate::fused_map::FusedMap;
     #[pymodule_export]
     use crate::neighbor_distances::mean_neighbor_distances;
     #[pymodule_export]

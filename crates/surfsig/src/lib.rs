@@ -42,6 +42,7 @@ mod field;
 mod finding;
 mod fit;
 mod frame;
+mod fused_map;
 mod geometry;
 mod hierarchy;
 mod kd_tree;
@@ -95,6 +96,7 @@ pub use fit::{
     Cylinder, FitAxes, FitKind, FitUsed, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere,
 };
 pub use frame::{FLAT_ATOM_NOISES, Frame, FrameParameters, Levels, SIGNATURE, VOCABULARY_END};
+pub use fused_map::FusedMap;
 pub use geometry::{RigidTransform, TransformError};
 pub use kd_tree::KdTree;
 pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};

@@ -15,6 +15,7 @@ negative z (:mod:`surfsig.simulate.scanner` draws the axes).
 
 from ..geometry import inverse, transform_points
 from .acquisitions import RANDOM_TILT, Acquisition, Jitter, paper_acquisition, paper_acquisitions
+from .circuit import circuit, circuit_poses
 from .ellipsoid import Ellipsoid
 from .height_field import HeightField
 from .machined_part import PART_SCANNER, part, part_scene
@@ -49,6 +50,8 @@ __all__ = [
     "Surface",
     "bent_calibration",
     "block",
+    "circuit",
+    "circuit_poses",
     "corridor",
     "distorted",
     "facing",
