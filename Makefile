@@ -14,7 +14,7 @@ SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -na
 # The page's tools, from npm; nothing where node is missing.
 NODE := $(shell command -v node 2>/dev/null)
 
-.PHONY: page test-web bench-page help demo test test-all lint format bench bench-reading bench-error bench-segmentation bench-intervals bench-registration bench-finding bench-odometry bench-trust bench-covariance bench-loops bench-multiway fuzz docs tour wheel check-wheel header install-c clean build bench-scale
+.PHONY: page test-web bench-page help demo test test-all lint format bench bench-reading bench-error bench-segmentation bench-intervals bench-registration bench-finding bench-odometry bench-trust bench-covariance bench-multiway fuzz docs tour wheel check-wheel header install-c clean build bench-scale
 .DEFAULT_GOAL := help
 
 help: ## Say what there is to make
@@ -102,9 +102,6 @@ bench-trust: build ## Register pairs that deceive, and write that part of BENCHM
 
 bench-covariance: build ## Compare errors of poses with their covariances, and write that part of BENCHMARKS.md
 	$(BIN)/python benchmarks/covariance.py --write
-
-bench-loops: build ## Go once round a building, with and without closing the loop, and write that part of BENCHMARKS.md
-	$(BIN)/python benchmarks/loops.py --write
 
 bench-multiway: build ## Register many scans at once, and write that part of BENCHMARKS.md
 	$(BIN)/python benchmarks/multiway.py --write

@@ -47,6 +47,7 @@ CALLS: dict[str, Callable[..., Any]] = {
     "downsample": lambda **how: surfsig.downsample(
         surfsig.PointCloud(POINTS, fields={"intensity": POINTS[:, 0].astype(np.float32)}), 0.1, **how
     ),
+    "fuse_scans": lambda **how: surfsig.fuse_scans([POINTS], [np.eye(4)], voxel=0.1, **how),
     "register": lambda **how: surfsig.register(POINTS, POINTS, init=np.eye(4), **how),
     "find_instances": lambda **how: surfsig.find_instances(BENT_EGG, BENT_EGG, **how).instances,
     "similarity_matrix": lambda **how: surfsig.similarity_matrix(

@@ -50,7 +50,7 @@ from surfsig.files import (
 )
 from surfsig.finding import Instance, Instances, Library, LibraryEntry, find_instances
 from surfsig.flat_atom import flat_atom_length
-from surfsig.mapping import Loop, LoopClosure, close_loops, fuse_scans
+from surfsig.fusion import fuse_scans
 from surfsig.missing_returns import remove_missing_returns
 from surfsig.odometry import Odometry, ScanStatus, estimate_odometry
 from surfsig.point_cloud import PointCloud
@@ -120,8 +120,6 @@ __all__ = [
     "InvalidInputError",
     "Library",
     "LibraryEntry",
-    "Loop",
-    "LoopClosure",
     "MultiwayRegistration",
     "Odometry",
     "OdometrySettings",
@@ -154,7 +152,6 @@ __all__ = [
     "TimedScan",
     "Trajectory",
     "__version__",
-    "close_loops",
     "crop",
     "downsample",
     "estimate_odometry",

@@ -36,14 +36,6 @@ if TYPE_CHECKING:
     "--distance", type=float, help="To partners in the map, at most.  [default: by how well motion is known]"
 )
 @click.option("--map-range", type=float, help="Of the map about the sensor.  [default: by the scans]")
-@click.option("--loops", is_flag=True, help="Correct the trajectory by places that were seen before.")
-@click.option(
-    "--map",
-    "map_file",
-    type=CLOUD,
-    metavar="FILE",
-    help="Write all scans as one cloud: a point per voxel, normals, and how many scans saw it.",
-)
 @click.option(
     "--report", type=CLOUD, metavar="FILE.html", help="Write a page with the trajectory and the map."
 )
@@ -60,8 +52,6 @@ def odometry_command(
     voxel: float | None,
     distance: float | None,
     map_range: float | None,
-    loops: bool,
-    map_file: Path | None,
     report: Path | None,
     threads: int | None,
     as_json: bool,
@@ -79,14 +69,14 @@ def odometry_command(
     Examples:
       surfsig odometry scans/* -o trajectory.txt
       surfsig odometry scans/ -o trajectory.tum
-      surfsig odometry 'scans/scan_*.ply' -o trajectory.txt --loops --map map.ply
+      surfsig odometry 'scans/scan_*.ply' -o trajectory.txt
       surfsig odometry drive.bag --topic /points -o trajectory.tum
     """  # noqa: D301
     import surfsig
     from surfsig.files import trajectory_format
     from surfsig.files.atomic import check_target
 
-    for target in (output, covariances, map_file, report):
+    for target in (output, covariances, report):
         if target is not None:
             check_target(target)
     shown = on_terminal() and not quiet
@@ -102,38 +92,23 @@ def odometry_command(
             progress=progress,
         )
     counts = found.counts()
-    closed = None
     if not counts["tracked"]:
         raise surfsig.InvalidInputError(f"{scans[0]}: no scan has enough points to find its pose")
     if counts["lost"]:
         warnings.warn(f"{counts['lost']} of {len(found)} scans are lost", stacklevel=1)
-    if loops:
-        with progress_bar("closing loops", "loops", shown=shown) as progress:
-            closed = surfsig.close_loops(sequence, found, threads=threads, progress=progress)
-        found = closed.odometry
     chosen = trajectory_format(output) if form is None else form
     surfsig.write_trajectory(output, found.poses, found.timestamps, format=chosen)
     if covariances is not None:
         surfsig.write_covariances(covariances, found.covariances)
-    if map_file is not None:
-        with progress_bar("fusing", "scans", shown=shown) as progress:
-            fused = surfsig.fuse_scans(
-                sequence, found.poses, voxel=found.voxel, threads=threads, progress=progress
-            )
-        surfsig.write(map_file, fused)
     if report is not None:
         # Read once more: a sequence may be larger than memory.
         clouds = (scan.cloud for scan in sequence)
         found.write_report(report, clouds, title=f"Trajectory of {scans[0].name}")
     if as_json:
-        values: dict[str, Any] = {"output": str(output), "format": chosen, "scans": len(found), **counts}
-        if closed is not None:
-            values["loops"] = [loop.values() for loop in closed.loops]
+        values = {"output": str(output), "format": chosen, "scans": len(found), **counts}
         print_json({**values, "length": found.length, "voxel": found.voxel})
     elif shown:
         rows = [("scans", f"{len(found):,}")]
         rows += [(name.replace("_", " "), f"{count:,}") for name, count in counts.items() if count]
-        if closed is not None:
-            rows.append(("loops", f"{closed.used} used of {len(closed.loops)} tried"))
         rows += [("length", number(found.length)), ("voxel", number(found.voxel))]
         print_table(f"{output}", rows, err=True)

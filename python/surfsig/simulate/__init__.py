@@ -15,12 +15,12 @@ negative z (:mod:`surfsig.simulate.scanner` draws the axes).
 
 from ..geometry import inverse, transform_points
 from .acquisitions import RANDOM_TILT, Acquisition, Jitter, paper_acquisition, paper_acquisitions
-from .circuit import circuit, circuit_poses
 from .ellipsoid import Ellipsoid
 from .height_field import HeightField
 from .machined_part import PART_SCANNER, part, part_scene
 from .places import block, corridor, forest, hall, pipes, plane, room, storey, tunnel, upright_pose
 from .poses import UP, facing, pose, turn
+from .round_trip import circuit, circuit_poses
 from .scanner import Scanner
 from .scene import Hits, Placed, Scene
 from .sensors import Calibration, DepthCamera, Lidar, bent_calibration, distorted, scan

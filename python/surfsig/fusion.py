@@ -63,16 +63,16 @@ def fuse_scans(
     tell = progress_callback(progress)
     fused = _surfsig.FusedMap(positive_length(voxel, "voxel"))
     count = 0
-    for count, cloud in enumerate(clouds_of(scans), start=1):
+    for count, cloud in enumerate(_clouds_of(scans), start=1):
         if count > len(matrices):
             raise InvalidInputError(f"there are {len(matrices)} poses, but more scans")
         if np.isfinite(matrices[count - 1]).all():
-            add_scan(fused, cloud, matrices[count - 1])
+            _add(fused, cloud, matrices[count - 1])
         if tell is not None:
             tell(count, len(matrices))
     if count != len(matrices):
         raise InvalidInputError(f"there are {len(matrices)} poses, but {count} scans")
-    cloud = map_of(fused)
+    cloud = _map_of(fused)
     if not len(cloud):
         return cloud
     found = extract(cloud, neighbors=_NEIGHBORS, threads=thread_count(threads))
@@ -80,7 +80,7 @@ def fuse_scans(
     return PointCloud(cloud.offsets, cloud.origin, fields={**normals, "scans": cloud.fields["scans"]})
 
 
-def clouds_of(scans: Scans) -> Iterable[PointCloud]:
+def _clouds_of(scans: Scans) -> Iterable[PointCloud]:
     """Walk through the scans, without missing returns."""
     sequence = open_scan_sequence(scans) if isinstance(scans, (str, os.PathLike)) else scans
     for scan in sequence:
@@ -88,7 +88,7 @@ def clouds_of(scans: Scans) -> Iterable[PointCloud]:
         yield remove_missing_returns(PointCloud.of(cloud))
 
 
-def add_scan(fused: _surfsig.FusedMap, cloud: PointCloud, T_map_scan: NDArray[np.float64]) -> None:
+def _add(fused: _surfsig.FusedMap, cloud: PointCloud, T_map_scan: NDArray[np.float64]) -> None:
     """Add a scan, seen from its viewpoint, or from (0, 0, 0)."""
     viewpoint = np.zeros(3) if cloud.viewpoint is None else cloud.viewpoint
     fused.add(
@@ -99,7 +99,7 @@ def add_scan(fused: _surfsig.FusedMap, cloud: PointCloud, T_map_scan: NDArray[np
     )
 
 
-def map_of(fused: _surfsig.FusedMap) -> PointCloud:
+def _map_of(fused: _surfsig.FusedMap) -> PointCloud:
     """Give the map; its normals are the directions to the sensors."""
     arrays = fused.arrays()
     directions = dict(zip(("nx", "ny", "nz"), arrays["directions_to_sensor"].T.copy(), strict=True))
