@@ -39,11 +39,11 @@ def find_instances(
 ) -> Instances:
     """Find every instance of a model, or of several, in a scene: transform, score, how much of it is seen.
 
-    Each place of the scene proposes a transform by the place of the model whose field signature is most like
-    its own. Transforms that many agree on are fitted to the scene's surface and judged by what the sensor
-    saw: what of the model is confirmed by points, less what it saw through and where it saw nothing. The best
-    is taken, with its points, and the others are judged again without these, until none is left that is good
-    enough. So half hidden instances are found, and where there is none, none is. The result is always the
+    Each place of the scene proposes transforms by the places of the model whose field signatures, of patches
+    of several sizes, are most like its own. Those that what the sensor saw supports most are fitted to the
+    scene's surface, and the probability of each is told by what of the model is confirmed, seen through or
+    not measured, how well it agrees, and whether the scene ends where the model does. The best is taken, with
+    its points, and the others are judged again without these, until none is left that is good enough. So half hidden instances are found, and where there is none, none is. The result is always the
     same.
 
     Parameters
@@ -56,7 +56,7 @@ def find_instances(
         counts, or where all of it can have been seen from its origin; otherwise only what is confirmed does,
         and instances that are none are found, too: a higher `score` leaves them out.
     score
-        Of an instance, at least: 1 is as much as can be seen of the model at once, with nothing against it.
+        Of an instance, at least: the probability that its pose is right.
     settings
         For experts; `FindSettings` describes what may be changed.
     threads

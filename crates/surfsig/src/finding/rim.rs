@@ -35,7 +35,8 @@ pub(super) struct Rim {
     /// Numbers of the samples that were stepped from.
     from: Vec<u32>,
     points: Vec<SurfacePlace>,
-    too_much: f64,
+    /// Share of the rim where the scene goes on, from which on the model lies in a larger surface.
+    pub too_much: f64,
 }
 
 impl Rim {
@@ -64,11 +65,12 @@ impl Rim {
         Self { from, points, too_much: if is_closed { TOO_MUCH } else { TOO_MUCH_OF_VIEW } }
     }
 
-    /// 1 where the scene ends with the model under T_scene_model, 0 where it goes on, or between.
+    /// Share of the rim where the scene goes on beyond the model under T_scene_model; 0 where it ends with it, and where
+    /// too little of the rim is seen.
     ///
     /// `is_touching` says which samples of the model lie on the scene's surface: where the model is hidden its rim does
     /// not count. `is_free` says which samples of the scene no other instance explains.
-    pub fn ends(
+    pub fn going_on(
         &self,
         transform: &RigidTransform,
         is_touching: &[bool],
@@ -90,9 +92,6 @@ impl Rim {
                     usize::from(f64::from(dot(&gap, &point.normal).abs()) < MAX_RESIDUAL * scene.voxel);
             }
         }
-        if asked < MIN_POINTS {
-            return 1.0;
-        }
-        (1.0 - going_on as f64 / asked as f64 / self.too_much).max(0.0)
+        if asked < MIN_POINTS { 0.0 } else { going_on as f64 / asked as f64 }
     }
 }

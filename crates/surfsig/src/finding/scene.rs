@@ -2,7 +2,7 @@
 
 use super::FindSettings;
 use super::model::Model;
-use super::samples::{Samples, described, oriented_outwards};
+use super::samples::{PLACES_OF_SCENE, Samples, described, oriented_outwards};
 use crate::alignment::OrientedSurface;
 use crate::depth_image::{DepthImage, SurfacePlace};
 use crate::scan::CenteredScan;
@@ -100,7 +100,7 @@ impl<'a> Scene<'a> {
             return Ok(Arc::clone(known));
         }
         let samples = self.samples(voxel)?;
-        let places = Arc::new(described(&self.scan, &samples.points, radius, self.monitor)?);
+        let places = Arc::new(described(&self.scan, &samples, radius, PLACES_OF_SCENE, self.monitor)?);
         self.places.push((radius, Arc::clone(&places)));
         Ok(places)
     }
@@ -125,9 +125,8 @@ impl<'a> Scene<'a> {
         Ok(surface)
     }
 
-    /// The same with the larger voxels of the first judgement, from the samples of the last.
-    pub fn coarse_surface(&mut self, voxel: f64) -> Result<Arc<SceneSurface>, Error> {
-        let coarse = self.settings.coarse_voxels * voxel;
+    /// The same with larger voxels, from the samples of the fine one.
+    pub fn thinned_surface(&mut self, voxel: f64, coarse: f64) -> Result<Arc<SceneSurface>, Error> {
         if let Some((_, known)) = self.surfaces.iter().find(|(of, _)| *of == coarse) {
             return Ok(Arc::clone(known));
         }
