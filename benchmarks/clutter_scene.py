@@ -1,4 +1,4 @@
-"""Depth images as real cameras take them: known objects on a table, half hidden in clutter, and their truth."""
+"""Depth images as real cameras take them: known objects in clutter on a table, and their truth."""
 
 from __future__ import annotations
 
@@ -116,8 +116,8 @@ def diameter(number: int) -> float:
 class ClutterScene:
     """A depth image and its truth.
 
-    `numbers` are those of the objects in it, `poses` are T_scene_object, (objects, 4, 4), and `visible` says what
-    share of each object's pixels nothing is before, measured ones only.
+    `numbers` are those of the objects in it, `poses` are T_scene_object, (objects, 4, 4), and `visible` says
+    at what share of each object's pixels it was measured, and nothing is before it.
     """
 
     cloud: surfsig.PointCloud
@@ -176,10 +176,7 @@ def clutter_scene(seed: int, *, shown: int = SHOWN, library: int = LIBRARY) -> C
     # What a camera shows of the table, so that nothing is placed out of sight.
     half_width = min(0.4 * distance * camera.width / camera.focal, CROWD)
     for number in range(shown + CLUTTER):
-        if number < shown:
-            parts = list(object_parts(int(numbers[number])))
-        else:
-            parts = _clutter(rng)
+        parts = list(object_parts(int(numbers[number]))) if number < shown else _clutter(rng)
         turn = np.asarray(Rotation.random(random_state=rng).as_matrix())
         points = _surface_points(parts, 600) @ turn.T
         radius = float(np.linalg.norm(points[:, :2], axis=1).max())

@@ -599,6 +599,7 @@ def find_instances(
     scene: _Scan,
     *,
     min_score: float,
+    at_most: int | None = None,
     settings: FindSettings | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,

@@ -151,12 +151,14 @@ fn places_to_python(py: Python<'_>, places: FieldPlaces) -> PyResult<Bound<'_, P
 /// Find instances of models; see `surfsig.find_instances`. Of each, by the names of its attributes, with the number of
 /// its model.
 #[pyfunction]
-#[pyo3(signature = (models, scene, *, min_score, settings=None, threads=None, progress=None))]
+#[allow(clippy::too_many_arguments)]
+#[pyo3(signature = (models, scene, *, min_score, at_most=None, settings=None, threads=None, progress=None))]
 pub fn find_instances<'py>(
     py: Python<'py>,
     models: Vec<ModelArgument<'py>>,
     scene: ScanArgument<'py>,
     min_score: f64,
+    at_most: Option<usize>,
     settings: Option<FindSettings>,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
@@ -166,6 +168,7 @@ pub fn find_instances<'py>(
     let scene = scene.scan()?;
     let mut settings = settings.map_or_else(surfsig::FindSettings::default, |settings| settings.core);
     settings.min_score = min_score;
+    settings.at_most = at_most.unwrap_or(usize::MAX);
     settings.threads = threads;
     let total = 2 + FIND_STEPS_PER_MODEL * models.len();
     let work = |monitor: &Monitor| surfsig::find_instances(&models, &scene, &settings, monitor);

@@ -19,7 +19,7 @@ _FEWEST_SMOOTHED = 0.5
 _OUTLINE = 1.0
 """Difference of two neighbours' disparities, in pixels, from which on an outline is between them."""
 _LIGHT_OF_HOLES = 0.25
-"""Reflectance times cosine at which a pixel is a hole if its noise is one standard deviation low: 16 in 100."""
+"""Reflectance times cosine at which 16 in 100 pixels are holes: those whose noise is a deviation low."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class StereoCamera:
     disparity_step
         Step in which disparities come, in pixels; 0 for none.
     smoothing
-        Standard deviation in pixels of the window over which a disparity is found: it smooths the surface, rounds
-        edges and makes neighbours' noise alike.
+        Standard deviation in pixels of the window over which a disparity is found: it smooths the surface,
+        rounds edges and makes neighbours' noise alike.
     bleeding
         Standard deviation in pixels by which the outline of what is nearer is moved, alike for neighbours.
     mixed

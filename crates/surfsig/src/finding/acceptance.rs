@@ -110,7 +110,7 @@ pub(super) fn accepted(
     let mut is_taken = vec![false; scene.scan.points.len()];
     let mut instances = Vec::new();
     let least = log_odds(settings.min_score);
-    loop {
+    while instances.len() < settings.at_most {
         monitor.check()?;
         // Of equal ones the first.
         let best = (0..candidates.len()).reduce(|best, other| {

@@ -13,6 +13,8 @@ use crate::alignment::{PointToSurfaceSettings, RivalSettings, ScaleLimits};
 pub struct FindSettings {
     /// Probability that an instance is right, at least.
     pub min_score: f64,
+    /// Instances of all models that are given at most, the most probable ones.
+    pub at_most: usize,
     /// Places of the model that are matched with each place of the scene.
     pub similar: usize,
     /// Points of the model by which all transforms that matches propose are judged, without alignment, where the scene's
@@ -101,6 +103,7 @@ impl Default for FindSettings {
     fn default() -> Self {
         Self {
             min_score: 0.5,
+            at_most: usize::MAX,
             similar: 5,
             rough_points: 100,
             rough_voxel: 0.08,
