@@ -1,4 +1,4 @@
-"""Known objects found in simulated depth images that are like real ones: recall, precision, calibration, time.
+"""Known objects found in simulated depth images that are like real ones: how many, how surely, how fast.
 
 python benchmarks/clutter.py --seeds 300 301 302 303 304
 """
@@ -6,6 +6,7 @@ python benchmarks/clutter.py --seeds 300 301 302 303 304
 from __future__ import annotations
 
 import argparse
+import itertools
 import time
 from dataclasses import dataclass, field
 
@@ -77,7 +78,7 @@ class Tally:
             f"precision {right.mean() if len(right) else np.nan:.2f}, "
             f"processor seconds {np.median(self.seconds):.1f} (median), {np.max(self.seconds):.1f} (most)"
         ]
-        for low, high in zip(BINS[:-1], BINS[1:], strict=True):
+        for low, high in itertools.pairwise(BINS):
             chosen = (scores >= low) & (scores <= high)
             if chosen.any():
                 lines.append(

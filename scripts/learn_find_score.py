@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 import surfsig
 
@@ -28,8 +29,11 @@ Array = NDArray[np.float64]
 
 LEAST = 0.01
 """Probability, by the coefficients that are replaced, of what is learnt from."""
-RIDGE = 0.02
+RIDGE = 0.002
 """Weight of the squared coefficients of standardised terms, so that few examples do not drive them away."""
+SIGNS = (0, 1, 1, -1, -1, 1, -1, -1, 1, 1, 0)
+"""Of the coefficients, for few examples tell them badly: 1 for what speaks for a pose, -1 for what speaks against it,
+0 for both."""
 NOT_SHOWN = 3
 """Objects that are not in the scene and are looked for, too."""
 
@@ -46,10 +50,10 @@ def terms(measures: dict[str, float]) -> list[float]:
         np.log(max(min(confirmed, 1.0), 1e-3)),
         measures["visible"],
         of(measures["contradicted"]),
-        of(measures["mismatched"]),
         of(measures["missing"]),
         measures["agreement"],
         measures["going_on"],
+        np.sqrt(measures["going_on"]),
         min(measures["roundness"] / 0.1, 1.0),
         np.log(max(measures["roundness"], 1e-3)),
         np.log(max(measures["resolution"], 1.0)),
@@ -57,20 +61,20 @@ def terms(measures: dict[str, float]) -> list[float]:
 
 
 def fitted(x: Array, y: Array) -> Array:
-    """Fit a logistic model by Newton's method; x has a constant first column."""
+    """Fit a logistic model whose coefficients have the signs of `SIGNS`; x has a constant first column."""
     mean, deviation = x.mean(axis=0), x.std(axis=0)
     mean[0], deviation[0] = 0.0, 1.0
     deviation[deviation == 0.0] = 1.0
     z = (x - mean) / deviation
-    w = np.zeros(x.shape[1])
-    ridge = np.full(len(w), RIDGE * len(y))
-    ridge[0] = 0.0
-    for _ in range(50):
-        p = 1.0 / (1.0 + np.exp(-z @ w))
-        gradient = z.T @ (y - p) - ridge * w
-        hessian = (z * (p * (1.0 - p))[:, None]).T @ z + np.diag(ridge + 1e-9)
-        w += np.linalg.solve(hessian, gradient)
-    w /= deviation
+
+    def loss(w: Array) -> tuple[float, Array]:
+        odds = z @ w
+        penalty = RIDGE * len(y) * np.r_[0.0, w[1:]]
+        value = np.logaddexp(0.0, odds).sum() - odds @ y + 0.5 * penalty @ w
+        return float(value), z.T @ (1.0 / (1.0 + np.exp(-odds)) - y) + penalty
+
+    bounds = [(None if sign <= 0 else 0.0, None if sign >= 0 else 0.0) for sign in SIGNS]
+    w = minimize(loss, np.zeros(x.shape[1]), jac=True, method="L-BFGS-B", bounds=bounds).x / deviation
     w[0] -= w @ mean
     return np.asarray(w)
 

@@ -60,11 +60,6 @@ impl Evidence {
         Self { support, measures: Measures::default(), log_odds: f64::NEG_INFINITY, visible, overlap }
     }
 
-    /// By what transforms are put in order before they are aligned closely: support that agrees.
-    pub fn promise(&self) -> f64 {
-        self.support * self.measures.agreement
-    }
-
     /// Probability that the transform is right.
     pub fn score(&self) -> f64 {
         1.0 / (1.0 + (-self.log_odds).exp())

@@ -38,7 +38,7 @@ pub struct Measures {
 /// Terms of the logistic model, the first of which is constant.
 const TERMS: usize = 11;
 /// Their coefficients.
-const COEFFICIENTS: [f64; TERMS] = [-7.0, 1.0, 5.0, -12.0, -5.0, -3.0, 8.0, -3.0, 1.0, 0.3, 0.0];
+const COEFFICIENTS: [f64; TERMS] = [-7.15, 4.29, 1.13, -25.91, -10.49, 0.0, -5.28, -10.96, 2.57, 0.0, 2.57];
 /// Spread of normals from which on they are more than a plane: it counts no more.
 const ROUND: f64 = 0.1;
 
@@ -71,10 +71,10 @@ impl Measures {
             self.confirmed.min(1.0).max(1e-3).ln(),
             self.visible,
             of(self.contradicted),
-            of(self.mismatched),
             of(self.missing),
             self.agreement,
             self.going_on,
+            self.going_on.max(0.0).sqrt(),
             (self.roundness / ROUND).min(1.0),
             (self.roundness.max(1e-3)).ln(),
             self.resolution.max(1.0).ln(),

@@ -187,7 +187,7 @@ fn best_first(
     let aligned = view.aligned(transforms, distances, usize::MAX);
     let judged = view.judged(&aligned, &vec![true; view.scene.samples().len()]);
     let mut order: Vec<usize> = (0..aligned.len()).filter(|&i| judged[i].support > 0.0).collect();
-    order.sort_by(|&a, &b| judged[b].promise().total_cmp(&judged[a].promise()));
+    order.sort_by(|&a, &b| judged[b].log_odds.total_cmp(&judged[a].log_odds));
     order.into_iter().map(move |i| aligned[i])
 }
 

@@ -1,6 +1,6 @@
 //! A model as it is looked for, prepared once.
 
-use super::samples::{PLACES_OF_MODEL, Samples, described, mean_length, oriented_outwards};
+use super::samples::{PLACES_OF_MODEL, Samples, described, mean_length, noise, oriented_outwards};
 use crate::depth_image::SurfacePlace;
 use crate::kd_tree::KdTree;
 use crate::scan::CenteredScan;
@@ -109,7 +109,8 @@ impl Model {
         is_sided: bool,
         monitor: &Monitor,
     ) -> Result<Self, Error> {
-        let samples = Samples::new(&scan, (radius / VOXELS_PER_RADIUS).max(spacing), monitor)?;
+        let voxel = (radius / VOXELS_PER_RADIUS).max(spacing);
+        let samples = Samples::new(&scan, voxel, noise(&scan, voxel, monitor)?, monitor)?;
         if samples.points.is_empty() {
             let text = "a model's points must lie on a surface: these have no normals";
             return Err(Error::InvalidModel(text.into()));

@@ -46,7 +46,7 @@ pub(super) struct Samples {
 
 impl Samples {
     /// Those of a scan, whose viewpoint or directions say on which side its normals are.
-    pub fn new(scan: &CenteredScan, voxel: f64, monitor: &Monitor) -> Result<Self, Error> {
+    pub fn new(scan: &CenteredScan, voxel: f64, noise: f64, monitor: &Monitor) -> Result<Self, Error> {
         let ball = Radius::new(NORMAL_BALL * voxel)?;
         let thinned = scan.thinned(voxel);
         let given = thinned.scan();
@@ -56,12 +56,14 @@ impl Samples {
         let known = (0..found.len()).filter(|&i| found.normals[i].iter().all(|c| c.is_finite()));
         let point =
             |i: usize| SurfacePlace { place: thinned.points[i].map(|x| x as f32), normal: found.normals[i] };
-        Ok(Self { points: known.map(point).collect(), noise: noise(scan, ball, monitor)? })
+        Ok(Self { points: known.map(point).collect(), noise })
     }
 }
 
-/// Standard deviation of the points from the surface in a ball; the median of some.
-fn noise(scan: &CenteredScan, ball: Radius, monitor: &Monitor) -> Result<f64, Error> {
+/// Standard deviation of the points from the surface around them, in balls for samples one voxel apart; the median of
+/// some.
+pub(super) fn noise(scan: &CenteredScan, voxel: f64, monitor: &Monitor) -> Result<f64, Error> {
+    let ball = Radius::new(NORMAL_BALL * voxel)?;
     let some: Vec<u32> = some_of(scan.points.len(), MEASURED).into_iter().map(|i| i as u32).collect();
     let cloud = scan.scan().cloud;
     let options = ExtractOptions::default();
@@ -250,8 +252,9 @@ mod tests {
         let scan = CenteredScan::new(
             &crate::Scan::new(crate::PointCloud::new_f64(&points)).seen_from([30.0, 30.0, 1e3]),
         );
-        let found = Samples::new(&scan, 2.0, &Monitor::default()).unwrap();
-        assert!((found.noise - 0.2).abs() < 0.02, "{}", found.noise);
+        let noise = noise(&scan, 2.0, &Monitor::default()).unwrap();
+        assert!((noise - 0.2).abs() < 0.02, "{noise}");
+        let found = Samples::new(&scan, 2.0, noise, &Monitor::default()).unwrap();
         // The surface is in one layer of voxels or in two.
         assert!((800..2000).contains(&found.points.len()), "{}", found.points.len());
         assert!(found.points.iter().all(|sample| sample.normal[2] > 0.8));

@@ -2,7 +2,7 @@
 
 use super::FindSettings;
 use super::model::Model;
-use super::samples::{PLACES_OF_SCENE, Samples, described, oriented_outwards};
+use super::samples::{PLACES_OF_SCENE, Samples, described, noise, oriented_outwards};
 use crate::alignment::OrientedSurface;
 use crate::depth_image::{DepthImage, SurfacePlace};
 use crate::scan::CenteredScan;
@@ -55,6 +55,7 @@ pub(super) struct Scene<'a> {
     pub viewpoint: Option<[f64; 3]>,
     settings: &'a FindSettings,
     monitor: &'a Monitor,
+    noises: Vec<(f64, f64)>,
     samples: Vec<(f64, Arc<Samples>)>,
     surfaces: Vec<(f64, Arc<SceneSurface>)>,
     places: Vec<(f64, Arc<FieldPlaces>)>,
@@ -82,6 +83,7 @@ impl<'a> Scene<'a> {
             viewpoint,
             settings,
             monitor,
+            noises: Vec::new(),
             samples: Vec::new(),
             surfaces: Vec::new(),
             places: Vec::new(),
@@ -91,7 +93,7 @@ impl<'a> Scene<'a> {
     /// Distance between the samples in which a model is looked for.
     pub fn voxel(&mut self, model: &Model) -> Result<f64, Error> {
         let voxel = model.voxel().max(model.spacing).max(self.settings.spacings_per_voxel * self.spacing);
-        Ok(voxel.max(self.settings.noises_per_voxel * self.samples(voxel)?.noise))
+        Ok(voxel.max(self.settings.noises_per_voxel * self.noise(voxel)?))
     }
 
     /// Its places with signatures of patches of a radius; `voxel` is that of the samples that tell where it is flat.
@@ -105,11 +107,21 @@ impl<'a> Scene<'a> {
         Ok(places)
     }
 
+    fn noise(&mut self, voxel: f64) -> Result<f64, Error> {
+        if let Some((_, known)) = self.noises.iter().find(|(of, _)| *of == voxel) {
+            return Ok(*known);
+        }
+        let noise = noise(&self.scan, voxel, self.monitor)?;
+        self.noises.push((voxel, noise));
+        Ok(noise)
+    }
+
     fn samples(&mut self, voxel: f64) -> Result<Arc<Samples>, Error> {
         if let Some((_, known)) = self.samples.iter().find(|(of, _)| *of == voxel) {
             return Ok(Arc::clone(known));
         }
-        let samples = Arc::new(Samples::new(&self.scan, voxel, self.monitor)?);
+        let noise = self.noise(voxel)?;
+        let samples = Arc::new(Samples::new(&self.scan, voxel, noise, self.monitor)?);
         self.samples.push((voxel, Arc::clone(&samples)));
         Ok(samples)
     }
