@@ -32,8 +32,8 @@ LEAST = 0.01
 RIDGE = 0.002
 """Weight of the squared coefficients of standardised terms, so that few examples do not drive them away."""
 SIGNS = (0, 1, 1, -1, -1, 1, -1, -1, 1, 1, 0)
-"""Of the coefficients, for few examples tell them badly: 1 for what speaks for a pose, -1 for what speaks against it,
-0 for both."""
+"""Of the coefficients, as few examples tell them badly: 1 of what speaks for a pose, -1 of what speaks
+against it, 0 of both."""
 NOT_SHOWN = 3
 """Objects that are not in the scene and are looked for, too."""
 

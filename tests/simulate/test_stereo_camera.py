@@ -8,7 +8,14 @@ from surfsig import simulate
 from surfsig.simulate.ellipsoid import Ellipsoid
 
 SMALL = simulate.StereoCamera(
-    width=160, height=120, focal=144.0, disparity_step=0.0, smoothing=0.0, bleeding=0.0, mixed=0.0, dropout=0.0
+    width=160,
+    height=120,
+    focal=144.0,
+    disparity_step=0.0,
+    smoothing=0.0,
+    bleeding=0.0,
+    mixed=0.0,
+    dropout=0.0,
 )
 
 
