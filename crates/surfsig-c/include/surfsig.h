@@ -894,8 +894,8 @@ void surfsig_model_free(surfsig_model *model);
 size_t surfsig_model_size(const surfsig_model *model);
 
 /**
- * Radius of the patches that describe the model, in its unit: 0.4 times the median distance of its points from their
- * middle, and 8 times their spacing at least; NaN for null.
+ * Radius of the smallest patches that describe the model, in its unit: about 0.4 times the median distance of its
+ * points from their middle, and about 8 times their spacing at least; NaN for null.
  */
 double surfsig_model_radius(const surfsig_model *model);
 

@@ -50,8 +50,8 @@ pub extern "C" fn surfsig_model_size(model: Option<&surfsig_model>) -> usize {
     model.map_or(0, |model| model.model.points.len())
 }
 
-/// Radius of the patches that describe the model, in its unit: 0.4 times the median distance of its points from their
-/// middle, and 8 times their spacing at least; NaN for null.
+/// Radius of the smallest patches that describe the model, in its unit: about 0.4 times the median distance of its
+/// points from their middle, and about 8 times their spacing at least; NaN for null.
 #[unsafe(no_mangle)]
 pub extern "C" fn surfsig_model_radius(model: Option<&surfsig_model>) -> f64 {
     model.map_or(f64::NAN, |model| model.model.places.radius)

@@ -37,8 +37,9 @@ pub struct Measures {
 
 /// Terms of the logistic model, the first of which is constant.
 const TERMS: usize = 11;
-/// Their coefficients.
-const COEFFICIENTS: [f64; TERMS] = [-7.15, 4.29, 1.13, -25.91, -10.49, 0.0, -5.28, -10.96, 2.57, 0.0, 2.57];
+/// Their coefficients, from 374 instances of 6 cluttered scenes and 5 of half hidden copies, of which 57 are right. Left
+/// out scene by scene, 26 of 27 instances with a probability above 0.9 are right, and 45 of 54 above 0.5.
+const COEFFICIENTS: [f64; TERMS] = [-7.17, 2.33, 2.45, -31.3, -9.25, 3.31, -6.79, -10.16, 2.86, 0.27, 1.35];
 /// Spread of normals from which on they are more than a plane: it counts no more.
 const ROUND: f64 = 0.1;
 
