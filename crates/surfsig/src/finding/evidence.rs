@@ -91,7 +91,7 @@ impl<'a> ModelView<'a> {
         let near_each_other = KdTree::new(&points);
         let order: Vec<usize> = near_each_other.indices().iter().map(|&i| chosen[i as usize]).collect();
         let samples = model.surface(&order);
-        let rim = Rim::new(model, &samples, scene.voxel);
+        let rim = Rim::new(model, &samples, scene.voxel, scene.spacing);
         let most_seen = most_seen(&samples);
         Self { rim, scene, viewpoint, reach: REACH * model.extent(), most_seen, samples, settings }
     }

@@ -9,8 +9,11 @@ use crate::kd_tree::KdTree;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
-/// Voxels along the surface from a sample of the model to a point beside it.
+/// Voxels along the surface from a sample of the model to a point beside it, at least.
 const STEP: f64 = 3.0;
+/// The same in point spacings of the scene, at least: depth cameras let an outline bleed over some four pixels, and
+/// smooth over three.
+const STEP_IN_SPACINGS: f64 = 7.0;
 /// Voxels from that to all of the model at least.
 const CLEARANCE: f64 = 1.5;
 /// Directions in which a step is tried.
@@ -41,7 +44,8 @@ pub(super) struct Rim {
 
 impl Rim {
     /// Steps from samples, which are some of the model's.
-    pub fn new(model: &Model, samples: &[SurfacePlace], voxel: f64) -> Self {
+    pub fn new(model: &Model, samples: &[SurfacePlace], voxel: f64, spacing: f64) -> Self {
+        let step_length = (STEP * voxel).max(STEP_IN_SPACINGS * spacing);
         let tree = KdTree::new(&model.points);
         let is_closed = model.is_closed();
         let mean = model.normals.iter().map(|&normal| Vector3::from(normal)).sum::<Vector3<f64>>();
@@ -54,7 +58,7 @@ impl Rim {
             let [across, along] = axes_across(&normal.normalize());
             for step in 0..DIRECTIONS {
                 let (sine, cosine) = (TAU * step as f64 / DIRECTIONS as f64).sin_cos();
-                let offset = (across * cosine + along * sine) * (STEP * voxel);
+                let offset = (across * cosine + along * sine) * step_length;
                 let beside: [f64; 3] = (Vector3::from(sample.place.map(f64::from)) + offset).into();
                 if tree.nearest(beside, CLEARANCE * voxel).is_none() {
                     from.push(number);

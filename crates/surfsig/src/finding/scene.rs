@@ -17,11 +17,13 @@ use std::sync::Arc;
 pub(super) struct SceneSurface {
     pub surface: OrientedSurface,
     pub voxel: f64,
+    /// Between the points of the scan.
+    pub spacing: f64,
 }
 
 impl SceneSurface {
-    pub fn new(samples: Vec<SurfacePlace>, voxel: f64) -> Self {
-        Self { surface: OrientedSurface::new(samples), voxel }
+    pub fn new(samples: Vec<SurfacePlace>, voxel: f64, spacing: f64) -> Self {
+        Self { surface: OrientedSurface::new(samples), voxel, spacing }
     }
 
     pub fn samples(&self) -> &[SurfacePlace] {
@@ -132,7 +134,7 @@ impl<'a> Scene<'a> {
             return Ok(Arc::clone(known));
         }
         let samples = self.samples(voxel)?;
-        let surface = Arc::new(SceneSurface::new(samples.points.clone(), voxel));
+        let surface = Arc::new(SceneSurface::new(samples.points.clone(), voxel, self.spacing));
         self.surfaces.push((voxel, Arc::clone(&surface)));
         Ok(surface)
     }
@@ -142,7 +144,8 @@ impl<'a> Scene<'a> {
         if let Some((_, known)) = self.surfaces.iter().find(|(of, _)| *of == coarse) {
             return Ok(Arc::clone(known));
         }
-        let surface = Arc::new(SceneSurface::new(thinned(&self.samples(voxel)?.points, coarse), coarse));
+        let surface =
+            Arc::new(SceneSurface::new(thinned(&self.samples(voxel)?.points, coarse), coarse, self.spacing));
         self.surfaces.push((coarse, Arc::clone(&surface)));
         Ok(surface)
     }

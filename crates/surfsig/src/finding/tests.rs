@@ -124,14 +124,14 @@ fn square(columns: std::ops::Range<i32>, rows: std::ops::Range<i32>) -> Vec<([f6
 
 fn surface_of(model: &Model, voxel: f64) -> Arc<SceneSurface> {
     let all: Vec<usize> = (0..model.samples.len()).collect();
-    Arc::new(SceneSurface::new(model.surface(&all), voxel))
+    Arc::new(SceneSurface::new(model.surface(&all), voxel, 0.3 * voxel))
 }
 
 #[test]
 fn a_model_ends_where_the_scene_does() {
     let model = model_of(square(0..20, 0..20));
     let samples = model.surface(&(0..400).collect::<Vec<_>>());
-    let rim = Rim::new(&model, &samples, 1.0);
+    let rim = Rim::new(&model, &samples, 1.0, 0.4);
     let going_on = |scene: Vec<([f64; 3], Vector3<f64>)>, is_touching: bool, is_free: bool| {
         let scene = surface_of(&model_of(scene), 1.0);
         let free = vec![is_free; scene.samples().len()];
