@@ -483,6 +483,9 @@ class FindSettings:
     def __new__(
         cls,
         *,
+        similar: int | None = None,
+        rough_points: int | None = None,
+        rough_voxel: float | None = None,
         proposals: int | None = None,
         first_points: int | None = None,
         first_distances: tuple[float, float, int] | None = None,
@@ -508,6 +511,15 @@ class FindSettings:
         touching_distance: float | None = None,
         agreement_by_chance: Sequence[float] | None = None,
     ) -> FindSettings: ...
+    @property
+    def similar(self) -> int:
+        """Places of the model that are matched with each place of the scene."""
+    @property
+    def rough_points(self) -> int:
+        """Points of the model by which all transforms that matches propose are judged, without alignment."""
+    @property
+    def rough_voxel(self) -> float:
+        """Voxels of that judgement in the model's extent."""
     @property
     def proposals(self) -> int:
         """Proposed transforms that are judged by few points."""
@@ -588,6 +600,7 @@ def find_instances(
     scene: _Scan,
     *,
     min_score: float,
+    at_most: int | None = None,
     settings: FindSettings | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,

@@ -50,5 +50,5 @@ RECURRENCE_CONFIDENCE = 0.99
 KEYPOINTS = 1000
 """Places that `surfsig.find_keypoints` chooses, where neither number nor distance is asked for."""
 
-INSTANCE_SCORE = 0.25
-"""Of a model in a scene, at least: half hidden ones have about 0.4, and what is not there below 0.2."""
+INSTANCE_SCORE = 0.5
+"""Probability that a model is where it is found, at least."""

@@ -455,8 +455,7 @@ typedef struct {
    */
   double center[3];
   /**
-   * What of the model is confirmed, less what is wrong, over the most of it that can be seen at once; 0.6 of that
-   * where it is not known from where the scene was seen.
+   * Probability that the transform is right: within a tenth of the model's diameter. Learnt on simulated scenes.
    */
   double score;
   /**
@@ -835,7 +834,7 @@ double surfsig_extraction_radius(const surfsig_extraction *extraction);
 int surfsig_extraction_oriented(const surfsig_extraction *extraction);
 
 /**
- * Makes options of the default values: instances with a score of 0.25 at least, all cores.
+ * Makes options of the default values: instances with a score of 0.5 at least, all cores.
  */
 surfsig_find_options *surfsig_find_options_new(void);
 
@@ -848,8 +847,7 @@ void surfsig_find_options_free(surfsig_find_options *options);
  * Chooses the least score of an instance.
  *
  * @param options The options to change.
- * @param score Above 0 and up to 1, which is as much as can be seen of the model at once with nothing against it; 0
- * for the default. Half hidden instances have about 0.4, and what is not there below 0.2.
+ * @param score The probability that the instance's pose is right, above 0 and up to 1; 0 for the default.
  */
 surfsig_code surfsig_find_options_set_score(surfsig_find_options *options,
                                             double score);
@@ -896,8 +894,8 @@ void surfsig_model_free(surfsig_model *model);
 size_t surfsig_model_size(const surfsig_model *model);
 
 /**
- * Radius of the patches that describe the model, in its unit: 0.4 times the median distance of its points from their
- * middle, and 8 times their spacing at least; NaN for null.
+ * Radius of the smallest patches that describe the model, in its unit: about 0.4 times the median distance of its
+ * points from their middle, and about 8 times their spacing at least; NaN for null.
  */
 double surfsig_model_radius(const surfsig_model *model);
 

@@ -13,7 +13,7 @@ pub struct surfsig_find_options {
     pub(crate) progress: Progress,
 }
 
-/// Makes options of the default values: instances with a score of 0.25 at least, all cores.
+/// Makes options of the default values: instances with a score of 0.5 at least, all cores.
 #[unsafe(no_mangle)]
 pub extern "C" fn surfsig_find_options_new() -> Box<surfsig_find_options> {
     Box::default()
@@ -28,8 +28,7 @@ pub extern "C" fn surfsig_find_options_free(options: Option<Box<surfsig_find_opt
 /// Chooses the least score of an instance.
 ///
 /// @param options The options to change.
-/// @param score Above 0 and up to 1, which is as much as can be seen of the model at once with nothing against it; 0
-/// for the default. Half hidden instances have about 0.4, and what is not there below 0.2.
+/// @param score The probability that the instance's pose is right, above 0 and up to 1; 0 for the default.
 #[unsafe(no_mangle)]
 pub extern "C" fn surfsig_find_options_set_score(
     options: Option<&mut surfsig_find_options>,

@@ -13,6 +13,12 @@ use surfsig::{FIELD_SIGNATURE, FIND_STEPS_PER_MODEL, FieldPlaces, Instance, Mode
 settings_class! {
     /// How instances are searched and judged, for experts; see `surfsig.find_instances`.
     FindSettings of surfsig::FindSettings {
+        /// Places of the model that are matched with each place of the scene.
+        similar: usize = similar,
+        /// Points of the model by which all transforms that matches propose are judged, without alignment.
+        rough_points: usize = rough_points,
+        /// Voxels of that judgement in the model's extent.
+        rough_voxel: f64 = rough_voxel,
         /// Proposed transforms that are judged by few points.
         proposals: usize = proposals,
         /// Points of the model in that first judgement.
@@ -64,8 +70,8 @@ settings_class! {
     }
 }
 
-/// Points (n, 3), their centre, spacing, radius of the patches, samples and normals (m, 3), places with signatures, and
-/// whether the outer side is known.
+/// Points (n, 3), their centre, spacing, radius of the patches, samples and normals (m, 3), places with signatures,
+/// larger radii with theirs, and whether the outer side is known.
 #[derive(FromPyObject)]
 pub struct ModelArgument<'py>(
     PyReadonlyArray2<'py, f64>,
@@ -75,6 +81,7 @@ pub struct ModelArgument<'py>(
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
     PlacesArgument<'py>,
+    Vec<(f64, PlacesArgument<'py>)>,
     bool,
 );
 
@@ -87,7 +94,12 @@ impl ModelArgument<'_> {
             samples: rows::<f64, 3>(&self.4)?.to_vec(),
             normals: rows::<f64, 3>(&self.5)?.to_vec(),
             places: FieldPlaces { radius: self.3, ..self.6.places()? },
-            is_sided: self.7,
+            larger_places: self
+                .7
+                .iter()
+                .map(|(radius, places)| Ok(FieldPlaces { radius: *radius, ..places.places()? }))
+                .collect::<PyResult<_>>()?,
+            is_sided: self.8,
         })
     }
 }
@@ -115,27 +127,38 @@ pub fn prepare_model<'py>(
     result.set_item("samples", matrix(model.samples)?)?;
     result.set_item("normals", matrix(model.normals)?)?;
     result.set_item("is_sided", model.is_sided)?;
-    let (places, arrays) = (model.places, PyDict::new(py));
-    arrays.set_item("points", matrix(places.points)?)?;
+    result.set_item("places", places_to_python(py, model.places)?)?;
+    let larger = model.larger_places.into_iter().map(|places| places_to_python(py, places));
+    result.set_item("larger_places", larger.collect::<PyResult<Vec<_>>>()?)?;
+    Ok(result)
+}
+
+/// Places by the names of the crate's arrays, with the radius of their patches.
+fn places_to_python(py: Python<'_>, places: FieldPlaces) -> PyResult<Bound<'_, PyDict>> {
+    let arrays = PyDict::new(py);
+    let count = places.points.len();
+    arrays.set_item("radius", places.radius)?;
+    arrays.set_item("points", places.points.into_flattened().into_pyarray(py).reshape([count, 3])?)?;
     arrays.set_item("vectors", table(py, places.vectors.into_flattened(), FIELD_SIGNATURE)?)?;
     arrays.set_item("axes", table(py, places.axes.into_flattened(), 3)?)?;
     arrays.set_item("tangents", table(py, places.tangents.into_flattened(), 3)?)?;
     let phases = places.phases.as_flattened().as_flattened().as_flattened().to_vec();
     arrays.set_item("phases", table(py, phases, PHASES)?)?;
     arrays.set_item("count", places.count.into_pyarray(py))?;
-    result.set_item("places", arrays)?;
-    Ok(result)
+    Ok(arrays)
 }
 
 /// Find instances of models; see `surfsig.find_instances`. Of each, by the names of its attributes, with the number of
 /// its model.
 #[pyfunction]
-#[pyo3(signature = (models, scene, *, min_score, settings=None, threads=None, progress=None))]
+#[allow(clippy::too_many_arguments)]
+#[pyo3(signature = (models, scene, *, min_score, at_most=None, settings=None, threads=None, progress=None))]
 pub fn find_instances<'py>(
     py: Python<'py>,
     models: Vec<ModelArgument<'py>>,
     scene: ScanArgument<'py>,
     min_score: f64,
+    at_most: Option<usize>,
     settings: Option<FindSettings>,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
@@ -145,6 +168,7 @@ pub fn find_instances<'py>(
     let scene = scene.scan()?;
     let mut settings = settings.map_or_else(surfsig::FindSettings::default, |settings| settings.core);
     settings.min_score = min_score;
+    settings.at_most = at_most.unwrap_or(usize::MAX);
     settings.threads = threads;
     let total = 2 + FIND_STEPS_PER_MODEL * models.len();
     let work = |monitor: &Monitor| surfsig::find_instances(&models, &scene, &settings, monitor);
@@ -160,6 +184,11 @@ fn to_python(py: Python<'_>, instance: Instance) -> PyResult<Bound<'_, PyDict>> 
     result.set_item("covariance", instance.covariance.as_flattened().to_pyarray(py).reshape([6, 6])?)?;
     result.set_item("center", instance.center.to_pyarray(py))?;
     result.set_item("score", instance.score)?;
+    let measures = PyDict::new(py);
+    for (name, value) in instance.measures.named() {
+        measures.set_item(name, value)?;
+    }
+    result.set_item("measures", measures)?;
     result.set_item("visible", instance.visible)?;
     result.set_item("overlap", instance.overlap)?;
     result.set_item("rms", instance.rms)?;

@@ -91,7 +91,9 @@ pub use field::{
     FieldSignature, KeypointOptions, field_distinctiveness, field_pools, field_signatures, find_keypoints,
     match_fields,
 };
-pub use finding::{FIND_STEPS_PER_MODEL, FindSettings, Instance, MODEL_STEPS, Model, find_instances};
+pub use finding::{
+    FIND_STEPS_PER_MODEL, FindSettings, Instance, MODEL_STEPS, Measures, Model, find_instances,
+};
 pub use fit::{
     Cylinder, FitAxes, FitKind, FitUsed, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere,
 };

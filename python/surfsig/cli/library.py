@@ -21,6 +21,7 @@ def library_command() -> None:
     \b
     Examples:
       surfsig library add things.db cup cup.ply
+      surfsig library add things.db meshes/ --unit mm
       surfsig library list things.db
       surfsig library remove things.db cup
     """  # noqa: D301
@@ -28,28 +29,37 @@ def library_command() -> None:
 
 @library_command.command("add", no_args_is_help=True)
 @click.argument("library", type=CLOUD)
-@click.argument("name")
-@click.argument("file", type=CLOUD)
+@click.argument("models", nargs=-1, required=True, metavar="NAME FILE | FILES...")
 @click.option("--replace", is_flag=True, help="Also where there is a model of this name.")
 @input_options
 @threads_option
 def add_command(
-    library: Path, name: str, file: Path, replace: bool, threads: int | None, **reading: Any
+    library: Path, models: tuple[str, ...], replace: bool, threads: int | None, **reading: Any
 ) -> None:
-    """Add the model in FILE to LIBRARY, which is made where there is none."""
+    """Add models to LIBRARY, which is made where there is none.
+
+    Give one model's NAME and FILE, or files and folders: each file is then a model with the file's name.
+    Points are spread over the outer surface of a mesh.
+    """
     import surfsig
+    from surfsig.finding.model_files import model_files, read_model
 
     store = surfsig.Library(library)
-    cloud = surfsig.read(file, **reading)
+    if len(models) == 2 and not Path(models[0]).exists():
+        found = {models[0]: Path(models[1])}
+    else:
+        found = model_files(map(Path, models))
     unit = "m" if reading.get("unit") else None
-    try:
-        entry = store.add(name, cloud, unit=unit, replace=replace, threads=threads)
-    except surfsig.InvalidInputError as error:
-        text = str(error)
-        raise surfsig.InvalidInputError(
-            text if text.startswith(str(library)) else f"{file}: {text}"
-        ) from None
-    click.echo(f"{library}: added {entry.name}, {entry.points:,} points")
+    for name, file in found.items():
+        cloud = read_model(file, **reading)
+        try:
+            entry = store.add(name, cloud, unit=unit, replace=replace, threads=threads)
+        except surfsig.InvalidInputError as error:
+            text = str(error)
+            raise surfsig.InvalidInputError(
+                text if text.startswith(str(library)) else f"{file}: {text}"
+            ) from None
+        click.echo(f"{library}: added {entry.name}, {entry.points:,} points")
 
 
 @library_command.command("list", no_args_is_help=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.cloud_transforms import transform_cloud
 from surfsig.digits import finite_rows, position_text, rounded
+from surfsig.files.atomic import replacing
 from surfsig.page import NOTEBOOK_POINTS, Layer, notebook_html, page_html, write_page
 from surfsig.page.packing import MOST_POINTS
 from surfsig.point_cloud import PointCloud
@@ -39,8 +41,12 @@ class Instance:
     center: Array
     """Middle of what touches the scene's points, (3,), in the scene's coordinates."""
     score: float
-    """What of the model is confirmed, less what is wrong, over the most of it that can be seen at once; 0.6
-    of that where the sensor's place is not known."""
+    """Probability that the pose is right, within a tenth of the model's diameter; as learnt on simulated
+    scenes."""
+    measures: dict[str, float]
+    """What it was computed from, by name: shares of the model that are confirmed, contradicted, mismatched or
+    missing, over the most of it that can be seen at once; how well what lies on the scene agrees with it; and
+    so on."""
     visible: float
     """Share of the surface facing the sensor that is seen, 0 to 1; of all of it where the sensor's place is
     not known."""
@@ -94,9 +100,12 @@ class Instance:
         return {
             "name": self.name,
             "T_scene_model": self.T_scene_model.tolist(),
+            "position": self.T_scene_model[:3, 3].tolist(),
+            "quaternion": _quaternion(self.T_scene_model),
             "covariance": finite_rows(self.covariance),
             "center": self.center.tolist(),
             "score": self.score,
+            "measures": self.measures,
             "visible": self.visible,
             "overlap": self.overlap,
             "rms": self.rms,
@@ -120,6 +129,8 @@ class Instances:
     """The scene."""
     models: dict[str, PointCloud]
     """Those that were found, by name."""
+    sought: int = 1
+    """Number of models that were looked for."""
 
     def __len__(self) -> int:
         """Return the number of instances."""
@@ -261,12 +272,52 @@ class Instances:
 
         Returns
         -------
-        "summary", and "instances", each as `Instance.values` with its number.
+        "summary", "models" (how many were looked for), and "instances", each as `Instance.values` with its
+        number.
         """
         return {
             "summary": self.summary(),
+            "models": self.sought,
             "instances": [{"number": n, **instance.values()} for n, instance in enumerate(self.instances)],
         }
+
+    def write_bop(
+        self,
+        path: str | Path,
+        *,
+        scene_id: int = 0,
+        image_id: int = 0,
+        millimetres: float = 1000.0,
+        seconds: float = -1.0,
+    ) -> None:
+        """Write the poses as the BOP benchmark reads them: a CSV file with a row for each instance.
+
+        The columns are scene_id, im_id, obj_id (the number at the end of the model's name, or its rank among
+        the found models' sorted names, from 1), score, R (row by row) and t (in millimetres) of
+        T_scene_model, and time.
+
+        Parameters
+        ----------
+        path
+            Where to write.
+        scene_id, image_id
+            Numbers of the scene and the image, as the benchmark counts them.
+        millimetres
+            Of the clouds' unit: 1000 for metres.
+        seconds
+            What all instances of the image took; -1 where it is not known.
+        """
+        order = sorted(self.models)
+        lines = ["scene_id,im_id,obj_id,score,R,t,time"]
+        for instance in self.instances:
+            digits = re.search(r"(\d+)$", instance.name)
+            number = int(digits[1]) if digits else order.index(instance.name) + 1
+            rotation = " ".join(f"{value:.9g}" for value in instance.T_scene_model[:3, :3].ravel())
+            position = " ".join(f"{millimetres * value:.9g}" for value in instance.T_scene_model[:3, 3])
+            first = f"{scene_id},{image_id},{number},{instance.score:.6f}"
+            lines.append(f"{first},{rotation},{position},{seconds:g}")
+        with replacing(Path(path)) as file:
+            file.write("\n".join(lines).encode() + b"\n")
 
     def to_pandas(self) -> pd.DataFrame:
         """Give the instances as a pandas DataFrame, a row each.
@@ -290,14 +341,18 @@ class Instances:
             row: dict[str, Any] = {"name": instance.name, "score": instance.score}
             row |= {"visible": instance.visible, "overlap": instance.overlap, "rms": instance.rms}
             row["points"] = len(instance.indices)
-            turn = Rotation.from_matrix(instance.T_scene_model[:3, :3]).as_quat()
-            row |= dict(zip(("qx", "qy", "qz", "qw"), turn, strict=True))
+            row |= dict(zip(("qx", "qy", "qz", "qw"), _quaternion(instance.T_scene_model), strict=True))
             row |= dict(zip(("tx", "ty", "tz"), instance.T_scene_model[:3, 3], strict=True))
             row["free"] = "; ".join(str(direction) for direction in instance.free_directions)
             rows.append(row)
         names = ["name", "score", "visible", "overlap", "rms", "points"]
         names += ["qx", "qy", "qz", "qw", "tx", "ty", "tz", "free"]
         return pandas.DataFrame(rows, columns=names)
+
+
+def _quaternion(pose: Array) -> list[float]:
+    """Give a pose's rotation as x, y, z, w, as ROS has it."""
+    return [float(value) for value in Rotation.from_matrix(pose[:3, :3]).as_quat()]
 
 
 def _with_digits(instance: Instance) -> str:

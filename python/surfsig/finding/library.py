@@ -24,7 +24,8 @@ from surfsig.point_cloud import PointCloud
 
 _MARK = 0x53534C42
 """SQLite's application id of such a file: "SSLB"."""
-_VERSION = 1
+_VERSION = 2
+"""Models of version 1 had signatures of one radius: they are prepared again when they are looked for."""
 _TABLE = """
 CREATE TABLE models (
     name TEXT PRIMARY KEY, added TEXT NOT NULL, unit TEXT, points INTEGER NOT NULL, radius REAL NOT NULL,
@@ -221,6 +222,9 @@ class Library:
                     store.execute(f"PRAGMA user_version = {_VERSION}")
                 elif mark != _MARK:
                     raise FileFormatError(f"{self.path}: not a library of models")
+                elif create and version < _VERSION:
+                    # What older versions cannot read is about to be written.
+                    store.execute(f"PRAGMA user_version = {_VERSION}")
                 elif version > _VERSION:
                     raise FileFormatError(
                         f"{self.path}: a library of version {version}; this knows {_VERSION}"
@@ -260,7 +264,9 @@ def _packed(model: Model) -> tuple[bytes, int]:
         "places": model.samples,
         "normals": model.normals,
     }
-    arrays |= {f"signature_{name}": getattr(model.signatures, name) for name in _SIGNATURES}
+    for number, signatures in enumerate((model.signatures, *model.larger_signatures)):
+        arrays[f"radius_{number}"] = np.float64(signatures.radius)
+        arrays |= {f"signature_{number}_{name}": getattr(signatures, name) for name in _SIGNATURES}
     file = io.BytesIO()
     np.savez(file, allow_pickle=False, **arrays)
     return zlib.compress(file.getvalue(), 1), file.tell()
@@ -273,12 +279,15 @@ def _unpacked(radius: float, spacing: float, sided: int, size: int, packed: byte
     if len(content) != size:
         raise ValueError("shorter than it was")
     with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-        signatures = FieldSignatures(
-            radius=radius,
-            oriented=True,
-            indices=None,
-            **{name: arrays[f"signature_{name}"] for name in _SIGNATURES},
-        )
         whole = (arrays[name] for name in ("points", "middle", "places", "normals"))
         points, center, samples, normals = whole
-    return Model(points, center, spacing, radius, samples, normals, signatures, bool(sided))
+        if "radius_0" not in arrays:
+            return model_of(PointCloud(points, origin=center))
+        signatures = []
+        while f"radius_{len(signatures)}" in arrays:
+            number = len(signatures)
+            known = {name: arrays[f"signature_{number}_{name}"] for name in _SIGNATURES}
+            own = float(arrays[f"radius_{number}"])
+            signatures.append(FieldSignatures(radius=own, oriented=True, indices=None, **known))
+    first, *larger = signatures
+    return Model(points, center, spacing, radius, samples, normals, first, tuple(larger), bool(sided))

@@ -37,14 +37,13 @@ class Model:
     """(m, 3), unit, outwards."""
     signatures: FieldSignatures
     """Of places all over it."""
+    larger_signatures: tuple[FieldSignatures, ...]
+    """The same of larger patches, the smaller first."""
     is_sided: bool
     """Whether it is known which side of the surface is the outer one."""
 
     def argument(self) -> tuple[Any, ...]:
         """Give the model as the core takes it."""
-        places = self.signatures
-        # A flat model has no places, and a reshape to -1 columns needs a row.
-        phases = np.ascontiguousarray(places.phases, np.complex64).view(np.float32)
         return (
             np.ascontiguousarray(self.points, np.float64),
             np.asarray(self.center, np.float64).tolist(),
@@ -52,15 +51,22 @@ class Model:
             float(self.radius),
             np.ascontiguousarray(self.samples, np.float64),
             np.ascontiguousarray(self.normals, np.float64),
-            (
-                np.ascontiguousarray(places.points, np.float64),
-                np.ascontiguousarray(places.vectors, np.float32),
-                np.ascontiguousarray(places.axes, np.float32),
-                np.ascontiguousarray(places.tangents, np.float32),
-                phases.reshape(len(places), math.prod(phases.shape[1:])),
-            ),
+            _places_argument(self.signatures),
+            [(float(larger.radius), _places_argument(larger)) for larger in self.larger_signatures],
             bool(self.is_sided),
         )
+
+
+def _places_argument(places: FieldSignatures) -> tuple[NDArray[Any], ...]:
+    # A flat model has no places, and a reshape to -1 columns needs a row.
+    phases = np.ascontiguousarray(places.phases, np.complex64).view(np.float32)
+    return (
+        np.ascontiguousarray(places.points, np.float64),
+        np.ascontiguousarray(places.vectors, np.float32),
+        np.ascontiguousarray(places.axes, np.float32),
+        np.ascontiguousarray(places.tangents, np.float32),
+        phases.reshape(len(places), math.prod(phases.shape[1:])),
+    )
 
 
 def model_of(data: PointCloud | ArrayLike, threads: int | None = None) -> Model:
@@ -74,14 +80,17 @@ def model_of(data: PointCloud | ArrayLike, threads: int | None = None) -> Model:
     cloud = PointCloud.of(data)
     scan = scan_argument(cloud.at(np.flatnonzero(cloud.finite)))
     found = _surfsig.prepare_model(scan, threads=thread_count(threads))
-    places = found.pop("places")
+    signatures = _signatures(found.pop("places"))
+    larger = tuple(_signatures(places) for places in found.pop("larger_places"))
+    return Model(signatures=signatures, larger_signatures=larger, **found)
+
+
+def _signatures(places: dict[str, Any]) -> FieldSignatures:
     count = len(places["points"])
-    signatures = FieldSignatures(
-        radius=found["radius"],
+    return FieldSignatures(
         oriented=True,
         indices=None,
         status=np.full(count, Status.OK, np.uint8),
         phases=places.pop("phases").view(np.complex64).reshape(count, 7, 8),
         **places,
     )
-    return Model(signatures=signatures, **found)

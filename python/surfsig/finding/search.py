@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
 from surfsig._surfsig import FindSettings
@@ -33,18 +33,21 @@ def find_instances(
     scene: PointCloud | ArrayLike,
     *,
     score: float = INSTANCE_SCORE,
+    at_most: int | None = None,
+    only: str | Sequence[str] | None = None,
+    mask: ArrayLike | None = None,
     settings: FindSettings | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Instances:
     """Find every instance of a model, or of several, in a scene: transform, score, how much of it is seen.
 
-    Each place of the scene proposes a transform by the place of the model whose field signature is most like
-    its own. Transforms that many agree on are fitted to the scene's surface and judged by what the sensor
-    saw: what of the model is confirmed by points, less what it saw through and where it saw nothing. The best
-    is taken, with its points, and the others are judged again without these, until none is left that is good
-    enough. So half hidden instances are found, and where there is none, none is. The result is always the
-    same.
+    Each place of the scene proposes transforms by the places of the model whose field signatures, of patches
+    of several sizes, are most like its own. Those that what the sensor saw supports most are fitted to the
+    scene's surface, and the probability of each is told by what of the model is confirmed, seen through or
+    not measured, how well it agrees, and whether the scene ends where the model does. The best is taken, with
+    its points, and the others are judged again without these, until none is left that is good enough. So half
+    hidden instances are found, and where there is none, none is. The result is always the same.
 
     Parameters
     ----------
@@ -56,7 +59,14 @@ def find_instances(
         counts, or where all of it can have been seen from its origin; otherwise only what is confirmed does,
         and instances that are none are found, too: a higher `score` leaves them out.
     score
-        Of an instance, at least: 1 is as much as can be seen of the model at once, with nothing against it.
+        Of an instance, at least: the probability that its pose is right.
+    at_most
+        How many instances of all models are given at most; the most probable ones.
+    only
+        Names of the models that are looked for, of a `Library` or a mapping; all by default.
+    mask
+        Which points of the scene an instance may have, (n,) of bool; all by default. Nothing is known of the
+        others: leave a margin around what is looked for.
     settings
         For experts; `FindSettings` describes what may be changed.
     threads
@@ -89,10 +99,10 @@ def find_instances(
     if missing.any():
         told = missing_returns_text(int(missing.sum()), len(given))
         warnings.warn(f"the scene: {told}; they are left out", stacklevel=2)
-    models = _models(model, threads)
-    numbers = np.flatnonzero(given.finite & ~missing)
+    models = _models(model, _names(only), threads)
+    numbers = np.flatnonzero(given.finite & ~missing & _mask(mask, len(given)))
     if len(numbers) < _FEWEST or not models:
-        return Instances([], given, {})
+        return Instances([], given, {}, len(models))
     warn_if_too_coarse(given, max(part.radius for part in models.values()), "the scene: patches")
     cloud = given.at(numbers)
     names = list(models)
@@ -100,6 +110,7 @@ def find_instances(
         [part.argument() for part in models.values()],
         scan_argument(cloud),
         min_score=min_score,
+        at_most=_most(at_most),
         settings=settings,
         threads=threads,
         progress=progress_callback(progress),
@@ -119,15 +130,50 @@ def find_instances(
                 warnings.warn(f"nothing was found, and {hint}", stacklevel=2)
     seen = {instance.name for instance in instances}
     clouds = {name: PointCloud(models[name].points, models[name].center) for name in names if name in seen}
-    return Instances(instances, given, clouds)
+    return Instances(instances, given, clouds, len(models))
 
 
-def _models(model: object, threads: int | None) -> dict[str, Model]:
+def _models(model: object, only: tuple[str, ...] | None, threads: int | None) -> dict[str, Model]:
     if isinstance(model, Library):
-        return {name: stored_model(model, name) for name in model.names()}
+        return {name: stored_model(model, name) for name in _chosen(model.names(), only)}
     if isinstance(model, Mapping) and all(isinstance(name, str) for name in model):
-        return {name: model_of(data, threads=threads) for name, data in model.items()}
+        return {name: model_of(model[name], threads=threads) for name in _chosen(tuple(model), only)}
+    if only is not None:
+        raise InvalidInputError("only chooses among the models of a library or a mapping: there is one model")
     return {"model": model_of(PointCloud.of(model), threads=threads)}
+
+
+def _chosen(names: tuple[str, ...], only: tuple[str, ...] | None) -> tuple[str, ...]:
+    unknown = [] if only is None else [name for name in only if name not in names]
+    if unknown:
+        raise InvalidInputError(f"only: there is no model {unknown[0]!r:.60}")
+    return names if only is None else tuple(name for name in names if name in only)
+
+
+def _names(only: str | Sequence[str] | None) -> tuple[str, ...] | None:
+    if only is None:
+        return None
+    names = (only,) if isinstance(only, str) else tuple(only)
+    if not names or not all(isinstance(name, str) for name in names):
+        raise InvalidInputError("only must be a model's name, or several")
+    return names
+
+
+def _mask(mask: ArrayLike | None, count: int) -> NDArray[np.bool_]:
+    if mask is None:
+        return np.ones(count, np.bool_)
+    array = np.asarray(mask)
+    if array.dtype != np.bool_ or array.size != count:
+        raise InvalidInputError(f"mask must be {count} values of bool, one for each point of the scene")
+    return array.ravel()
+
+
+def _most(value: int | None) -> int | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise InvalidInputError(f"at_most must be a whole number above 0, not {value!r:.40}")
+    return int(value)
 
 
 def _score(value: float) -> float:

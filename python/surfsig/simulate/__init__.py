@@ -3,8 +3,9 @@
 A :class:`Scene` is made of analytic surfaces, each placed by a rigid pose; a :class:`Scanner` sweeps a laser
 sheet over it and measures what the laser lights *and* the camera sees, with noise, rounding and outliers.
 A :class:`Lidar` or a :class:`DepthCamera` looks around from one place of a room, a corridor, a hall, a forest
-(:func:`scan`; :mod:`surfsig.simulate.places`). Metres throughout; a :class:`Scanner`'s heights grow along
-negative z (:mod:`surfsig.simulate.scanner` draws the axes).
+(:func:`scan`; :mod:`surfsig.simulate.places`), and a :class:`StereoCamera` has the errors of real depth
+cameras. Metres throughout; a :class:`Scanner`'s heights grow along negative z
+(:mod:`surfsig.simulate.scanner` draws the axes).
 
 >>> from surfsig import simulate
 >>> ball = simulate.Placed(simulate.Sphere(0.02), simulate.pose((0, 0, -0.02)), "ball")
@@ -24,6 +25,7 @@ from .round_trip import circuit, circuit_poses
 from .scanner import Scanner
 from .scene import Hits, Placed, Scene
 from .sensors import Calibration, DepthCamera, Lidar, bent_calibration, distorted, scan
+from .stereo_camera import StereoCamera
 from .surfaces import Box, Cone, Cylinder, Plane, Rectangle, Sphere, Surface
 
 __all__ = [
@@ -47,6 +49,7 @@ __all__ = [
     "Scanner",
     "Scene",
     "Sphere",
+    "StereoCamera",
     "Surface",
     "bent_calibration",
     "block",

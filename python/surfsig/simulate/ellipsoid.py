@@ -25,6 +25,11 @@ class Ellipsoid(Surface):
     def __post_init__(self) -> None:
         self._check_lengths()
 
+    @property
+    def extent(self) -> float:
+        """See :attr:`Surface.extent`."""
+        return max(self.semi_axes)
+
     def crossings(self, origins: Array, directions: Array) -> Array:
         """See :meth:`Surface.crossings`; k = 2."""
         # Scaled along its axes it is the unit sphere, and the ray's parameters stay what they are.

@@ -72,6 +72,17 @@ class Placed:
             kept &= solid.implicit(points) >= -_SEAM
         return kept
 
+    def near(self, origins: Array, directions: Array) -> npt.NDArray[np.intp]:
+        """Numbers of the rays that pass the surface's sphere about its origin; the others cannot meet it."""
+        if not np.isfinite(self.surface.extent):
+            return np.arange(len(origins))
+        to_center = self.pose[:3, 3] - origins
+        along = np.einsum("ij,ij->i", to_center, directions)
+        square = np.einsum("ij,ij->i", to_center, to_center)
+        aside = square - along**2 / np.einsum("ij,ij->i", directions, directions)
+        # What is lost to cancellation is far below a thousandth of the distance.
+        return np.flatnonzero(aside <= (self.surface.extent * 1.001) ** 2 + 1e-6 * square)
+
     def crossings(self, origins: Array, directions: Array) -> Array:
         """Ray parameters (k, n) in the scene, infinite where there is none; see :meth:`Surface.crossings`."""
         to_object = inverse(self.pose)
@@ -152,10 +163,11 @@ class Scene:
         nearest = np.full(len(origins), np.inf)
         surface = np.full(len(origins), -1, dtype=np.int32)
         for index, placed in enumerate(self.objects):
-            for t in placed.crossings(origins, directions):
-                closer = (t > 0.0) & (t < nearest)
-                nearest[closer] = t[closer]
-                surface[closer] = index
+            ray = placed.near(origins, directions)
+            for t in placed.crossings(origins[ray], directions[ray]):
+                closer = (t > 0.0) & (t < nearest[ray])
+                nearest[ray[closer]] = t[closer]
+                surface[ray[closer]] = index
         points = np.full((len(origins), 3), np.nan)
         normals, curvatures = points.copy(), points[:, :2].copy()
         for index, placed in enumerate(self.objects):
@@ -188,8 +200,9 @@ class Scene:
         origins, directions = _rays(np.broadcast_to(eye, points.shape), points - eye)
         result = np.zeros(len(points), dtype=np.bool_)
         for placed in self.objects:
-            for t in placed.crossings(origins, directions):
-                result |= (t > 0.0) & (t < 1.0 - 1e-6)
+            ray = placed.near(origins, directions)
+            for t in placed.crossings(origins[ray], directions[ray]):
+                result[ray] |= (t > 0.0) & (t < 1.0 - 1e-6)
         return result
 
 

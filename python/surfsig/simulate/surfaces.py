@@ -58,6 +58,11 @@ class Surface(ABC):
     def curvatures(self, points: Array) -> Array:
         """Principal curvatures k1 >= k2, (n, 2) per metre, at points on the surface, (n, 3)."""
 
+    @property
+    def extent(self) -> float:
+        """Largest distance of its points from the origin, in metres; infinite where it is not known."""
+        return np.inf
+
     def _check_lengths(self) -> None:
         """Refuse lengths that are not positive and finite."""
         for field in fields(self):  # type: ignore[arg-type]  # every concrete surface is a dataclass
@@ -147,6 +152,11 @@ class Rectangle(Plane):
     def __post_init__(self) -> None:
         self._check_lengths()
 
+    @property
+    def extent(self) -> float:
+        """See :attr:`Surface.extent`."""
+        return float(np.hypot(*self.size)) / 2.0
+
     def crossings(self, origins: Array, directions: Array) -> Array:
         """See :meth:`Surface.crossings`; k = 1."""
         t = super().crossings(origins, directions)[0]
@@ -169,6 +179,11 @@ class Sphere(Surface):
 
     def __post_init__(self) -> None:
         self._check_lengths()
+
+    @property
+    def extent(self) -> float:
+        """See :attr:`Surface.extent`."""
+        return self.radius
 
     def crossings(self, origins: Array, directions: Array) -> Array:
         """See :meth:`Surface.crossings`; k = 2."""
@@ -220,6 +235,11 @@ class Cylinder(Surface):
 
     def __post_init__(self) -> None:
         self._check_lengths()
+
+    @property
+    def extent(self) -> float:
+        """See :attr:`Surface.extent`."""
+        return float(np.hypot(self.radius, self.length / 2.0))
 
     def crossings(self, origins: Array, directions: Array) -> Array:
         """See :meth:`Surface.crossings`; k = 4, or 2 when open."""
@@ -289,6 +309,11 @@ class Cone(Surface):
         excess = _radial(points)[1] - (self.radius + self._slope * points[:, 2])
         return np.asarray(excess / np.hypot(1.0, self._slope))
 
+    @property
+    def extent(self) -> float:
+        """See :attr:`Surface.extent`."""
+        return float(max(self.radius, np.hypot(self.top_radius, self.height)))
+
     def crossings(self, origins: Array, directions: Array) -> Array:
         """See :meth:`Surface.crossings`; k = 4, or 2 when open."""
         slope = self._slope
@@ -356,6 +381,11 @@ class Box(Surface):
 
     def __post_init__(self) -> None:
         self._check_lengths()
+
+    @property
+    def extent(self) -> float:
+        """See :attr:`Surface.extent`."""
+        return float(np.linalg.norm(self.size)) / 2.0
 
     def crossings(self, origins: Array, directions: Array) -> Array:
         """See :meth:`Surface.crossings`; k = 2."""

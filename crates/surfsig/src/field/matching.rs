@@ -53,37 +53,73 @@ pub fn match_fields(source: &FieldPlaces, target: &FieldPlaces, mutual: bool) ->
     if source.is_empty() || target.is_empty() {
         return Vec::new();
     }
-    let nearest = most_similar(&source.vectors, &target.vectors);
-    let back = if mutual { most_similar(&target.vectors, &source.vectors) } else { Vec::new() };
+    let nearest = most_similar(&source.vectors, &target.vectors, 1);
+    let back = if mutual { most_similar(&target.vectors, &source.vectors, 1) } else { Vec::new() };
     let is_mutual = |&(place, (other, _)): &(usize, (usize, f32))| !mutual || back[other].0 == place;
     let mut kept: Vec<(usize, (usize, f32))> = nearest.into_iter().enumerate().filter(is_mutual).collect();
     kept.sort_by(|a, b| b.1.1.total_cmp(&a.1.1));
-    let matched = |(place, (other, product)): (usize, (usize, f32))| FieldMatch {
+    kept.into_par_iter()
+        .with_min_len(16)
+        .map(|(place, (other, product))| matched(source, place, target, other, product))
+        .collect()
+}
+
+/// For each place of the source the `count` most similar ones of the target (all, if there are fewer): place by place,
+/// the most similar first.
+pub(crate) fn similar_places(source: &FieldPlaces, target: &FieldPlaces, count: usize) -> Vec<FieldMatch> {
+    let count = count.min(target.len());
+    if count == 0 {
+        return Vec::new();
+    }
+    let similar = most_similar(&source.vectors, &target.vectors, count);
+    similar
+        .into_par_iter()
+        .enumerate()
+        .with_min_len(16)
+        .map(|(number, (other, product))| matched(source, number / count, target, other, product))
+        .collect()
+}
+
+fn matched(
+    source: &FieldPlaces,
+    place: usize,
+    target: &FieldPlaces,
+    other: usize,
+    product: f32,
+) -> FieldMatch {
+    FieldMatch {
         source: place,
         target: other,
         distance: (2.0 - 2.0 * product).max(0.0).sqrt(),
         T_target_source: transform(source, place, target, other),
-    };
-    kept.into_par_iter().with_min_len(16).map(matched).collect()
+    }
 }
 
-/// For each vector the number of the one with the largest scalar product, the first of several, and the product.
-fn most_similar(vectors: &[[f32; FIELD_SIGNATURE]], among: &[[f32; FIELD_SIGNATURE]]) -> Vec<(usize, f32)> {
+/// For each vector the numbers of the `count` with the largest scalar products, the largest first and of equal ones the
+/// first, and the products. There are at least `count`.
+fn most_similar(
+    vectors: &[[f32; FIELD_SIGNATURE]],
+    among: &[[f32; FIELD_SIGNATURE]],
+    count: usize,
+) -> Vec<(usize, f32)> {
     let set = InstructionSet::detect();
     let panels: Vec<Panel<FIELD_SIGNATURE>> = among.par_chunks(COLUMNS).map(Panel::of).collect();
     let of_some = |some: &[[f32; FIELD_SIGNATURE]]| {
         let rows = std::array::from_fn(|row| &some[row.min(some.len() - 1)]);
-        let mut best = [(0, f32::NEG_INFINITY); ROWS];
+        let mut best: [Vec<(usize, f32)>; ROWS] =
+            std::array::from_fn(|_| vec![(0, f32::NEG_INFINITY); count]);
         for (panel, first) in panels.iter().zip((0..).step_by(COLUMNS)) {
             for (best, products) in best.iter_mut().zip(products(set, &rows, panel)) {
                 for (other, product) in (first..among.len()).zip(products) {
-                    if product > best.1 {
-                        *best = (other, product);
+                    if product > best[count - 1].1 {
+                        let rank = best.partition_point(|(_, known)| *known >= product);
+                        best[rank..].rotate_right(1);
+                        best[rank] = (other, product);
                     }
                 }
             }
         }
-        best[..some.len()].to_vec()
+        best[..some.len()].concat()
     };
     vectors.par_chunks(ROWS).flat_map_iter(of_some).collect()
 }
@@ -181,6 +217,25 @@ mod tests {
         let mutual = match_fields(&source, &target, true);
         assert_eq!(mutual.len(), (0..53).filter(|&a| backward[forward[a]] == a).count());
         assert!(mutual.iter().all(|found| backward[found.target] == found.source));
+    }
+
+    #[test]
+    fn several_similar_places_are_those_of_a_search_through_all() {
+        let (source, target) = (random_places(21, 4), random_places(30, 5));
+        let found = similar_places(&source, &target, 3);
+        assert_eq!(found.len(), 3 * source.len());
+        for (place, some) in found.chunks(3).enumerate() {
+            let product = |b: usize| -> f32 {
+                source.vectors[place].iter().zip(&target.vectors[b]).map(|(x, y)| x * y).sum()
+            };
+            let mut order: Vec<usize> = (0..target.len()).collect();
+            order.sort_by(|&a, &b| product(b).total_cmp(&product(a)));
+            let numbers: Vec<usize> = some.iter().map(|one| one.target).collect();
+            assert_eq!(numbers, order[..3]);
+            assert!(some.iter().all(|one| one.source == place));
+        }
+        assert_eq!(similar_places(&source, &target, 99).len(), 21 * 30);
+        assert!(similar_places(&source, &FieldPlaces::new(1.0), 3).is_empty());
     }
 
     #[test]

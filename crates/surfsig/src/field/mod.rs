@@ -17,6 +17,7 @@ pub use field_places::FieldPlaces;
 pub use frame::{FIELD_PHASES, FIELD_SIGNATURE, FieldPhases};
 pub(crate) use keypoints::keypoints_within;
 pub use keypoints::{KeypointOptions, find_keypoints};
+pub(crate) use matching::similar_places;
 pub use matching::{FieldMatch, match_fields};
 
 use crate::simd::InstructionSet;

@@ -4,7 +4,7 @@ use super::evidence::{Evidence, ModelView};
 use super::examination::{Examined, Refined};
 use super::model::Model;
 use super::scene::{Scene, SceneSurface};
-use super::{FindSettings, Instance};
+use super::{FindSettings, Instance, log_odds};
 use crate::alignment::{FreeDirection, TargetSurface, even_sample, infinite_along};
 use crate::geometry::RigidTransform;
 use crate::kd_tree::KdTree;
@@ -109,11 +109,12 @@ pub(super) fn accepted(
     let mut unexplained = Unexplained::new(&candidates);
     let mut is_taken = vec![false; scene.scan.points.len()];
     let mut instances = Vec::new();
-    loop {
+    let least = log_odds(settings.min_score);
+    while instances.len() < settings.at_most {
         monitor.check()?;
         // Of equal ones the first.
         let best = (0..candidates.len()).reduce(|best, other| {
-            let is_better = candidates[other].evidence.score > candidates[best].evidence.score;
+            let is_better = candidates[other].evidence.log_odds > candidates[best].evidence.log_odds;
             if is_better { other } else { best }
         });
         let Some(best) = best else { break };
@@ -121,10 +122,10 @@ pub(super) fn accepted(
         let Some(refined) = refined(&candidate, scene, &is_taken, settings) else { continue };
         let fitted = &refined.candidate;
         let evidence = fitted.judged(unexplained.of(fitted));
-        if evidence.score < settings.min_score {
+        if evidence.log_odds < least {
             continue;
         }
-        let examined = refined.examined(evidence.score, unexplained.of(fitted), settings);
+        let examined = refined.examined(evidence.support, unexplained.of(fitted), settings);
         let own = fitted.near(scene.scan.points.par_iter().copied(), settings.own_distance);
         let own: Vec<usize> = own.into_iter().filter(|&number| !is_taken[number]).collect();
         own.iter().for_each(|&number| is_taken[number] = true);
@@ -138,7 +139,7 @@ pub(super) fn accepted(
                 other.evidence = other.judged(unexplained.of(other));
             }
         }
-        candidates.retain(|candidate| candidate.evidence.score >= settings.min_score);
+        candidates.retain(|candidate| candidate.evidence.log_odds >= least);
     }
     instances.sort_by(|a, b| b.score.total_cmp(&a.score));
     Ok(instances)
@@ -200,8 +201,8 @@ fn instance(
         scale_standard_error: examined.scale_standard_error,
         doubts: examined.doubts,
         center,
-        // Of a scene that several sensors saw more may be confirmed than one can see at once.
-        score: evidence.score.min(1.0),
+        score: evidence.score(),
+        measures: evidence.measures,
         visible: evidence.visible,
         overlap: evidence.overlap,
         rms: fit.rms,

@@ -1,11 +1,12 @@
 //! What speaks for a transform of a model: the part that the sensor saw, less what it saw through or missed.
 
 use super::FindSettings;
+use super::likelihood::Measures;
 use super::model::Model;
 use super::rim::Rim;
 use super::scene::SceneSurface;
 use crate::alignment::{FACING_AWAY, cosine_towards, transformed};
-use crate::depth_image::{ALIKE, FACING, SurfacePlace, dot};
+use crate::depth_image::{ALIKE, DepthImage, FACING, Judgement, SurfacePlace, dot};
 use crate::geometry::RigidTransform;
 use crate::kd_tree::KdTree;
 use crate::random::some_of;
@@ -28,7 +29,11 @@ const VIEWS: usize = 100;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Evidence {
     /// Confirmed less wrong samples, over the most of the model that can be seen at once.
-    pub score: f64,
+    pub support: f64,
+    /// What the probability that the transform is right was computed from; zeros where nothing supports it.
+    pub measures: Measures,
+    /// Logarithm of the odds that it is right.
+    pub log_odds: f64,
     /// Share of what faces the sensor that is seen, 0 to 1; of all where it is not known from where all was seen.
     pub visible: f64,
     /// Share of the model's surface that lies on the scene's, 0 to 1.
@@ -49,11 +54,22 @@ pub(super) struct ModelView<'a> {
     settings: &'a FindSettings,
 }
 
+impl Evidence {
+    /// Of a transform that nothing speaks for.
+    fn none(support: f64, visible: f64, overlap: f64) -> Self {
+        Self { support, measures: Measures::default(), log_odds: f64::NEG_INFINITY, visible, overlap }
+    }
+
+    /// Probability that the transform is right.
+    pub fn score(&self) -> f64 {
+        1.0 / (1.0 + (-self.log_odds).exp())
+    }
+}
+
 /// What depth images say of a model's samples.
 struct Seen {
     /// Shares of all.
-    confirmed: f64,
-    wrong: f64,
+    judgement: Judgement,
     /// Share of those that face the sensor.
     visible: f64,
     /// Of each to the line of sight.
@@ -75,7 +91,7 @@ impl<'a> ModelView<'a> {
         let near_each_other = KdTree::new(&points);
         let order: Vec<usize> = near_each_other.indices().iter().map(|&i| chosen[i as usize]).collect();
         let samples = model.surface(&order);
-        let rim = Rim::new(model, &samples, scene.voxel);
+        let rim = Rim::new(model, &samples, scene.voxel, scene.spacing);
         let most_seen = most_seen(&samples);
         Self { rim, scene, viewpoint, reach: REACH * model.extent(), most_seen, samples, settings }
     }
@@ -100,9 +116,46 @@ impl<'a> ModelView<'a> {
 
     /// Weighs transforms (T_scene_model); `is_free` says which samples of the scene no other instance explains.
     pub fn judged(&self, transforms: &[RigidTransform], is_free: &[bool]) -> Vec<Evidence> {
-        let Some(viewpoint) = self.viewpoint else {
+        if self.viewpoint.is_none() {
             return transforms.par_iter().map(|transform| self.weighed(transform, None, is_free)).collect();
-        };
+        }
+        self.in_images(transforms, is_free, |image, local, viewpoint, transform| {
+            let judgement = image.judge(local, &self.samples, self.scene.voxel as f32);
+            // In the model's axes only one point has to be moved.
+            let from = transform.inverse().transform_point(viewpoint).map(|x| x as f32);
+            let cosines: Vec<f32> = self.samples.iter().map(|sample| cosine_towards(sample, from)).collect();
+            let facing = cosines.iter().filter(|&&cosine| cosine > FACING).count();
+            let facing = facing as f64 / self.samples.len().max(1) as f64;
+            let confirmed = f64::from(judgement.confirmed);
+            let visible = confirmed / facing.max(confirmed).max(1e-9);
+            self.weighed(transform, Some(&Seen { judgement, visible, cosines }), is_free)
+        })
+    }
+
+    /// The support of each transform by depth images alone, which costs little; there is a viewpoint.
+    pub fn supports(&self, transforms: &[RigidTransform]) -> Vec<f64> {
+        let all = vec![true; self.scene.samples().len()];
+        self.in_images(transforms, &all, |image, local, _, _| {
+            self.support(&image.judge(local, &self.samples, self.scene.voxel as f32))
+        })
+    }
+
+    fn support(&self, judgement: &Judgement) -> f64 {
+        let Judgement { confirmed, contradicted, missing, .. } = judgement;
+        let [confirmed, contradicted, missing] = [confirmed, contradicted, missing].map(|x| f64::from(*x));
+        let wrong = self.settings.contradicted_weight * contradicted + self.settings.missing_weight * missing;
+        (confirmed - wrong) / self.most_seen
+    }
+
+    /// What is told of each transform by the depth image of the cell that its model's middle is in: the image, the
+    /// transform about the image's middle, the viewpoint, and the transform.
+    fn in_images<T: Send>(
+        &self,
+        transforms: &[RigidTransform],
+        is_free: &[bool],
+        told: impl Fn(&DepthImage, &RigidTransform, [f64; 3], &RigidTransform) -> T + Sync,
+    ) -> Vec<T> {
+        let Some(viewpoint) = self.viewpoint else { return Vec::new() };
         let edge = CELL * self.reach;
         let mut cells: FxHashMap<[i64; 3], Vec<usize>> = FxHashMap::default();
         for (number, transform) in transforms.iter().enumerate() {
@@ -113,37 +166,26 @@ impl<'a> ModelView<'a> {
             let middle = cell.map(|x| x as f64 * edge);
             let reach = self.reach + HALF_DIAGONAL * edge;
             let image = self.scene.image(middle, reach, viewpoint, is_free);
-            let judged = |&number: &usize| {
+            let told = |&number: &usize| {
                 let transform = &transforms[number];
                 let mut local = *transform;
                 local.translation -= Vector3::from(middle);
-                let found = image.judge(&local, &self.samples, self.scene.voxel as f32);
-                let [confirmed, contradicted, missing] =
-                    [found.confirmed, found.contradicted, found.missing].map(f64::from);
-                let wrong =
-                    self.settings.contradicted_weight * contradicted + self.settings.missing_weight * missing;
-                // In the model's axes only one point has to be moved.
-                let from = transform.inverse().transform_point(viewpoint).map(|x| x as f32);
-                let cosines: Vec<f32> =
-                    self.samples.iter().map(|sample| cosine_towards(sample, from)).collect();
-                let facing = cosines.iter().filter(|&&cosine| cosine > FACING).count();
-                let facing = facing as f64 / self.samples.len().max(1) as f64;
-                let visible = confirmed / facing.max(confirmed).max(1e-9);
-                let seen = Seen { confirmed, wrong, visible, cosines };
-                (number, self.weighed(transform, Some(&seen), is_free))
+                (number, told(&image, &local, viewpoint, transform))
             };
-            numbers.iter().map(judged).collect::<Vec<_>>()
+            numbers.iter().map(told).collect::<Vec<_>>()
         };
-        let mut judged: Vec<(usize, Evidence)> = cells.par_iter().map(of_cell).flatten_iter().collect();
-        judged.sort_unstable_by_key(|(number, _)| *number);
-        judged.into_iter().map(|(_, evidence)| evidence).collect()
+        let mut told: Vec<(usize, T)> = cells.par_iter().map(of_cell).flatten_iter().collect();
+        told.sort_unstable_by_key(|(number, _)| *number);
+        told.into_iter().map(|(_, value)| value).collect()
     }
 
     /// The evidence, by what depth images say where it is known from where all was seen.
     fn weighed(&self, transform: &RigidTransform, seen: Option<&Seen>, is_free: &[bool]) -> Evidence {
-        let score = |shares: &Seen| (shares.confirmed - shares.wrong) / self.most_seen;
-        if let Some(shares) = seen.filter(|shares| score(shares) <= 0.0) {
-            return Evidence { score: score(shares), visible: shares.visible, overlap: 0.0 };
+        if let Some(seen) = seen {
+            let support = self.support(&seen.judgement);
+            if support <= 0.0 {
+                return Evidence::none(support, seen.visible, 0.0);
+            }
         }
         let moved: Vec<SurfacePlace> =
             self.samples.iter().map(|sample| transformed(transform, sample)).collect();
@@ -156,26 +198,39 @@ impl<'a> ModelView<'a> {
             nearest.iter().map(|near| near.is_some_and(|sample| is_free[sample])).collect();
         let share = |count: usize| count as f64 / self.samples.len().max(1) as f64;
         let overlap = share(nearest.iter().flatten().count());
-        let (score, visible) = match seen {
-            Some(shares) => (score(shares), shares.visible),
+        let touching = share(is_touching.iter().filter(|&&touches| touches).count());
+        let (support, visible, judgement) = match seen {
+            Some(seen) => (self.support(&seen.judgement), seen.visible, seen.judgement),
             None => {
-                let confirmed = share(is_touching.iter().filter(|&&touches| touches).count());
-                (self.settings.unknown_free_space_weight * confirmed / self.most_seen, confirmed)
+                let unknown = Judgement { confirmed: touching as f32, ..Default::default() };
+                (self.settings.unknown_free_space_weight * touching / self.most_seen, touching, unknown)
             }
         };
-        if score <= 0.0 {
-            return Evidence { score, visible, overlap };
+        if support <= 0.0 || touching <= 0.0 {
+            return Evidence::none(support, visible, overlap);
         }
         let on = || (0..moved.len()).filter(|&sample| is_touching[sample]);
-        let round = normal_spread(on().map(|sample| &self.samples[sample].normal));
-        let score = score
-            * (round / self.settings.round_spread).min(1.0)
-            * self.rim.ends(transform, &is_touching, &self.scene, is_free)
-            * self.agreement(on().filter_map(|sample| Some((&moved[sample], nearest[sample]?))));
-        Evidence { score, visible, overlap }
+        let measures = Measures {
+            support,
+            confirmed: f64::from(judgement.confirmed) / self.most_seen,
+            visible,
+            contradicted: f64::from(judgement.contradicted) / self.most_seen,
+            mismatched: f64::from(judgement.mismatched) / self.most_seen,
+            missing: f64::from(judgement.missing) / self.most_seen,
+            agreement: self.agreement(on().filter_map(|sample| Some((&moved[sample], nearest[sample]?)))),
+            going_on: self.rim.going_on(transform, &is_touching, &self.scene, is_free),
+            roundness: normal_spread(on().map(|sample| &self.samples[sample].normal)),
+            resolution: self.reach / self.scene.voxel,
+        };
+        let log_odds = if seen.is_some() {
+            measures.log_odds()
+        } else {
+            measures.log_odds_without_free_space(self.rim.too_much, self.settings)
+        };
+        Evidence { support, measures, log_odds, visible, overlap }
     }
 
-    /// 1 where samples lie as close to the scene's as those of the same surface do, 0 where they touch by chance.
+    /// Mean agreement in residual and normal of pairs of a sample and the scene's near it: 1 on the same surface.
     fn agreement<'b>(&self, pairs: impl Iterator<Item = (&'b SurfacePlace, usize)>) -> f64 {
         let touching = (self.settings.touching_distance * self.scene.voxel) as f32;
         let (mut sum, mut count) = (0.0, 0.0);
@@ -189,8 +244,7 @@ impl<'a> ModelView<'a> {
             sum += f64::from(agreement);
             count += 1.0;
         }
-        let [chance, same] = self.settings.agreement_by_chance;
-        if count > 0.0 { ((sum / count - chance) / (same - chance)).clamp(0.0, 1.0) } else { 0.0 }
+        if count > 0.0 { sum / count } else { 0.0 }
     }
 }
 

@@ -33,9 +33,9 @@ pub(super) struct Examined {
 }
 
 impl Refined<'_> {
-    /// Tries to refute the transform, whose score is given; `is_free` says which samples of the scene no other instance
+    /// Tries to refute the transform, whose support is given; `is_free` says which samples of the scene no other instance
     /// explains.
-    pub fn examined(&self, score: f64, is_free: &[bool], settings: &FindSettings) -> Examined {
+    pub fn examined(&self, support: f64, is_free: &[bool], settings: &FindSettings) -> Examined {
         let numbers = some_of(self.sample.len(), settings.rivals.points);
         let some: Vec<[f64; 3]> = numbers.into_iter().map(|i| self.sample[i]).collect();
         let sought = &self.candidate.sought;
@@ -66,7 +66,7 @@ impl Refined<'_> {
         // What the sensor saw through or did not see refutes a rival, too.
         let is_as_good = |transform: &RigidTransform| {
             let rival = Candidate { T_scene_model: *transform, ..self.candidate.clone() };
-            rival.judged(is_free).score >= (1.0 - settings.rival_deficit) * score
+            rival.judged(is_free).support >= (1.0 - settings.rival_deficit) * support
         };
         let alternatives: Vec<RigidTransform> = rivals
             .as_good_as_the_best(&best, &proposed, |_| settings.rivals.deficit)

@@ -8,6 +8,7 @@
 mod acceptance;
 mod evidence;
 mod examination;
+mod likelihood;
 mod model;
 mod proposals;
 mod result;
@@ -16,17 +17,18 @@ mod samples;
 mod scene;
 mod settings;
 
+pub use likelihood::Measures;
 pub use model::{MODEL_STEPS, Model};
 pub use result::Instance;
 pub use settings::FindSettings;
 
 use crate::geometry::RigidTransform;
 use crate::scan::CenteredScan;
-use crate::{Error, Monitor, Scan, with_threads};
+use crate::{Error, FieldPlaces, Monitor, Scan, with_threads};
 use acceptance::{Candidate, Sought, accepted};
 use evidence::ModelView;
 use model::{MIN_POINTS, SPACINGS_PER_RADIUS};
-use proposals::{different, proposed_transforms};
+use proposals::{different, proposed_transforms, raw_transforms};
 use scene::Scene;
 use std::sync::Arc;
 
@@ -105,8 +107,11 @@ fn candidates_of<'a>(
     let least = SPACINGS_PER_RADIUS * scene.spacing;
     let model = if model.places.radius < least { model.with_radius(least, monitor)? } else { model.clone() };
     let voxel = scene.voxel(&model)?;
-    let places = scene.places(model.places.radius, voxel)?;
-    let (coarse, fine) = (scene.coarse_surface(voxel)?, scene.fine_surface(voxel)?);
+    let places: Vec<Arc<FieldPlaces>> =
+        model.all_places().map(|own| scene.places(own.radius, voxel)).collect::<Result<_, _>>()?;
+    let fine = scene.fine_surface(voxel)?;
+    let coarse = scene.thinned_surface(voxel, settings.coarse_voxels * voxel)?;
+    let rough = scene.thinned_surface(voxel, (settings.rough_voxel * model.extent()).max(coarse.voxel))?;
     monitor.add(1);
     let mut sides = vec![model];
     if !(sides[0].is_sided && scene.is_oriented) {
@@ -119,8 +124,15 @@ fn candidates_of<'a>(
         let view = |surface: &Arc<_>, most| {
             ModelView::new(&side, Arc::clone(surface), scene.viewpoint, most, settings)
         };
-        let proposed = proposed_transforms(&side.places, &places, settings);
         let [distance, angle] = [settings.same[0] * side.places.radius, settings.same[1]];
+        let proposed = if scene.viewpoint.is_some() {
+            let pairs = side.all_places().zip(&places);
+            let raw: Vec<RigidTransform> =
+                pairs.flat_map(|(own, seen)| raw_transforms(own, seen, settings.similar)).collect();
+            supported(&view(&rough, settings.rough_points), &raw, settings)
+        } else {
+            proposed_transforms(&side.places, &places[0], settings)
+        };
         let first = view(&coarse, settings.first_points);
         let kept = best_first(&first, &proposed, settings.first_distances);
         let kept = different(kept, settings.kept, distance, angle);
@@ -135,7 +147,8 @@ fn candidates_of<'a>(
         let aligned = last.aligned(&tried, settings.fine_distances, settings.aligned_points);
         let judged = last.judged(&aligned, &vec![true; fine.samples().len()]);
         let sought = Arc::new(Sought::new(number, side, last));
-        let good = aligned.into_iter().zip(judged).filter(|(_, found)| found.score >= settings.min_score);
+        let least = log_odds(settings.min_score);
+        let good = aligned.into_iter().zip(judged).filter(|(_, found)| found.log_odds >= least);
         candidates.extend(good.map(|(transform, evidence)| Candidate {
             sought: Arc::clone(&sought),
             T_scene_model: transform,
@@ -143,8 +156,26 @@ fn candidates_of<'a>(
         }));
     }
     monitor.add(FIND_STEPS_PER_MODEL - 1);
-    candidates.sort_by(|a, b| b.evidence.score.total_cmp(&a.evidence.score));
+    candidates.sort_by(|a, b| b.evidence.log_odds.total_cmp(&a.evidence.log_odds));
     Ok(candidates)
+}
+
+/// Logarithm of the odds of a probability.
+fn log_odds(probability: f64) -> f64 {
+    (probability / (1.0 - probability)).ln()
+}
+
+/// The transforms that what the sensor saw supports most, each different from the others.
+fn supported(
+    view: &ModelView<'_>,
+    transforms: &[RigidTransform],
+    settings: &FindSettings,
+) -> Vec<RigidTransform> {
+    let supports = view.supports(transforms);
+    let mut order: Vec<usize> = (0..transforms.len()).filter(|&i| supports[i] > 0.0).collect();
+    order.sort_by(|&a, &b| supports[b].total_cmp(&supports[a]));
+    let [distance, angle] = [settings.rough_same[0] * view.reach, settings.rough_same[1]];
+    different(order.into_iter().map(|i| transforms[i]), settings.proposals, distance, angle)
 }
 
 /// Transforms, aligned by the samples of a view, that anything speaks for; the best first.
@@ -155,8 +186,8 @@ fn best_first(
 ) -> impl Iterator<Item = RigidTransform> + use<> {
     let aligned = view.aligned(transforms, distances, usize::MAX);
     let judged = view.judged(&aligned, &vec![true; view.scene.samples().len()]);
-    let mut order: Vec<usize> = (0..aligned.len()).filter(|&i| judged[i].score > 0.0).collect();
-    order.sort_by(|&a, &b| judged[b].score.total_cmp(&judged[a].score));
+    let mut order: Vec<usize> = (0..aligned.len()).filter(|&i| judged[i].support > 0.0).collect();
+    order.sort_by(|&a, &b| judged[b].log_odds.total_cmp(&judged[a].log_odds));
     order.into_iter().map(move |i| aligned[i])
 }
 

@@ -1,6 +1,6 @@
 //! A model as it is looked for, prepared once.
 
-use super::samples::{Samples, described, mean_length, oriented_outwards};
+use super::samples::{PLACES_OF_MODEL, Samples, described, mean_length, noise, oriented_outwards};
 use crate::depth_image::SurfacePlace;
 use crate::kd_tree::KdTree;
 use crate::scan::CenteredScan;
@@ -8,8 +8,13 @@ use crate::spacing::point_spacing;
 use crate::visibility::all_seen_from;
 use crate::{Error, FieldPlaces, Monitor, Scan, with_threads};
 
-/// Radius of the patches in units of the median distance of the model's points from their centre.
+/// Radius of the smallest patches in units of the median distance of the model's points from their centre.
 const RADIUS_SHARE: f64 = 0.4;
+/// Between radii of patches: those of models of a library are on one ladder, so that a scene is described once for all.
+const LADDER: f64 = std::f64::consts::SQRT_2;
+/// Steps of the ladder from the smallest patches to the others. Where a camera's noise hides what is small, patches of
+/// a quarter to a third of the object give most right proposals (`benchmarks/clutter.py`).
+const LARGER: [i32; 2] = [1, 2];
 /// Voxels of a patch's radius between the samples of a surface.
 const VOXELS_PER_RADIUS: f64 = 16.0;
 /// Point spacings that a patch's radius has at least.
@@ -52,6 +57,8 @@ pub struct Model {
     pub normals: Vec<[f64; 3]>,
     /// Places all over the surface, with their field signatures and the radius of their patches.
     pub places: FieldPlaces,
+    /// The same of larger patches, the smaller first.
+    pub larger_places: Vec<FieldPlaces>,
     /// Whether it is known which side is the outer one.
     pub is_sided: bool,
 }
@@ -78,6 +85,7 @@ impl Model {
         if radius == 0.0 {
             return Err(Error::InvalidModel("a model's points must not all be at one place".into()));
         }
+        let radius = on_ladder(radius);
         let is_known =
             |&viewpoint: &_| scan.directions.is_none() && all_seen_from(viewpoint, &scan.points, spacing);
         let mut scan = CenteredScan { viewpoint: scan.viewpoint.filter(is_known), ..scan };
@@ -101,26 +109,35 @@ impl Model {
         is_sided: bool,
         monitor: &Monitor,
     ) -> Result<Self, Error> {
-        let samples = Samples::new(&scan, (radius / VOXELS_PER_RADIUS).max(spacing), monitor)?.points;
-        if samples.is_empty() {
+        let voxel = (radius / VOXELS_PER_RADIUS).max(spacing);
+        let samples = Samples::new(&scan, voxel, noise(&scan, voxel, monitor)?, monitor)?;
+        if samples.points.is_empty() {
             let text = "a model's points must lie on a surface: these have no normals";
             return Err(Error::InvalidModel(text.into()));
         }
-        let places = described(&scan, &samples, radius, monitor)?;
+        let places = described(&scan, &samples, radius, PLACES_OF_MODEL, monitor)?;
+        let larger =
+            |step: &i32| described(&scan, &samples, radius * LADDER.powi(*step), PLACES_OF_MODEL, monitor);
         Ok(Self {
+            larger_places: LARGER.iter().map(larger).collect::<Result<_, _>>()?,
             center: scan.center,
             spacing,
-            samples: samples.iter().map(|sample| sample.place.map(f64::from)).collect(),
-            normals: samples.iter().map(|sample| sample.normal.map(f64::from)).collect(),
+            samples: samples.points.iter().map(|sample| sample.place.map(f64::from)).collect(),
+            normals: samples.points.iter().map(|sample| sample.normal.map(f64::from)).collect(),
             places,
             is_sided,
             points: scan.points,
         })
     }
 
-    /// The same with patches of another radius.
+    /// The same with patches of about another radius.
     pub(super) fn with_radius(&self, radius: f64, monitor: &Monitor) -> Result<Self, Error> {
-        Self::described(self.oriented(1.0), radius, self.spacing, self.is_sided, monitor)
+        Self::described(self.oriented(1.0), on_ladder(radius), self.spacing, self.is_sided, monitor)
+    }
+
+    /// Places with signatures of patches of all radii, the smallest first.
+    pub(super) fn all_places(&self) -> impl Iterator<Item = &FieldPlaces> {
+        std::iter::once(&self.places).chain(&self.larger_places)
     }
 
     /// The same with the surface's other side as the outer one.
@@ -147,14 +164,20 @@ impl Model {
     /// An error where arrays that somebody stored do not belong together.
     pub(super) fn check(&self) -> Result<(), Error> {
         let finite = |points: &[[f64; 3]]| points.iter().flatten().all(|x| x.is_finite());
-        let places = &self.places;
-        let lengths = [places.vectors.len(), places.axes.len(), places.tangents.len(), places.phases.len()];
+        let are_whole = |places: &FieldPlaces| {
+            [places.vectors.len(), places.axes.len(), places.tangents.len(), places.phases.len()]
+                == [places.points.len(); 4]
+                && places.radius.is_finite()
+                && places.radius >= 0.0
+                && finite(&places.points)
+        };
         let is_whole = self.normals.len() == self.samples.len()
             && !self.samples.is_empty()
             && self.points.len() >= MIN_POINTS
-            && lengths == [places.points.len(); 4]
-            && [self.spacing, places.radius].iter().all(|length| length.is_finite() && *length >= 0.0)
-            && [&self.points, &self.samples, &self.normals, &places.points].iter().all(|all| finite(all));
+            && self.all_places().all(are_whole)
+            && self.spacing.is_finite()
+            && self.spacing >= 0.0
+            && [&self.points, &self.samples, &self.normals].iter().all(|all| finite(all));
         if is_whole {
             Ok(())
         } else {
@@ -187,4 +210,9 @@ impl Model {
         };
         numbers.iter().map(sample).collect()
     }
+}
+
+/// The nearest radius on the ladder.
+fn on_ladder(radius: f64) -> f64 {
+    LADDER.powf((radius.ln() / LADDER.ln()).round())
 }

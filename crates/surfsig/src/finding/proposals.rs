@@ -6,7 +6,7 @@
 
 use super::FindSettings;
 use crate::FieldPlaces;
-use crate::field::match_fields;
+use crate::field::{match_fields, similar_places};
 use crate::geometry::RigidTransform;
 use crate::kd_tree::KdTree;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -133,6 +133,12 @@ pub(super) fn proposed_transforms(
     let weights = matches.iter().map(weight).collect();
     let proposals = Proposals::new(&transforms, weights, distance * model.radius, angle);
     proposals.most_agreed(settings.proposals, settings.merged_share)
+}
+
+/// T_scene_model by each place of the scene and each of the places of the model that are most similar to it. Many are
+/// wrong: they are for a judgement that costs little.
+pub(super) fn raw_transforms(model: &FieldPlaces, scene: &FieldPlaces, count: usize) -> Vec<RigidTransform> {
+    similar_places(scene, model, count).par_iter().map(|one| one.T_target_source.inverse()).collect()
 }
 
 /// The transforms that are not the same as an earlier one, `most` of them at most.

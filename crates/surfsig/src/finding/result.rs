@@ -1,5 +1,6 @@
 //! What [`crate::find_instances`] gives.
 
+use super::Measures;
 use crate::alignment::{Doubt, FreeDirection};
 use crate::geometry::RigidTransform;
 
@@ -25,9 +26,10 @@ pub struct Instance {
     pub covariance: [[f64; 6]; 6],
     /// Middle of what lies on the scene's points, in the scene's coordinates.
     pub center: [f64; 3],
-    /// What of the model is confirmed, less what is wrong, over the most of it that can be seen at once; 0.6 of that
-    /// where it is not known from where the scene was seen.
+    /// Probability that the transform is right: within a tenth of the model's diameter. Learnt on simulated scenes.
     pub score: f64,
+    /// What it was computed from.
+    pub measures: Measures,
     /// Share of the surface facing the sensor that is seen, 0 to 1; of all of it where the viewpoint is not known.
     pub visible: f64,
     /// Share of the model's whole surface that lies on the scene's, 0 to 1.

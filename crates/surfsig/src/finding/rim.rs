@@ -9,8 +9,11 @@ use crate::kd_tree::KdTree;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
-/// Voxels along the surface from a sample of the model to a point beside it.
+/// Voxels along the surface from a sample of the model to a point beside it, at least.
 const STEP: f64 = 3.0;
+/// The same in point spacings of the scene, at least: depth cameras let an outline bleed over some four pixels, and
+/// smooth over three.
+const STEP_IN_SPACINGS: f64 = 7.0;
 /// Voxels from that to all of the model at least.
 const CLEARANCE: f64 = 1.5;
 /// Directions in which a step is tried.
@@ -35,12 +38,14 @@ pub(super) struct Rim {
     /// Numbers of the samples that were stepped from.
     from: Vec<u32>,
     points: Vec<SurfacePlace>,
-    too_much: f64,
+    /// Share of the rim where the scene goes on, from which on the model lies in a larger surface.
+    pub too_much: f64,
 }
 
 impl Rim {
     /// Steps from samples, which are some of the model's.
-    pub fn new(model: &Model, samples: &[SurfacePlace], voxel: f64) -> Self {
+    pub fn new(model: &Model, samples: &[SurfacePlace], voxel: f64, spacing: f64) -> Self {
+        let step_length = (STEP * voxel).max(STEP_IN_SPACINGS * spacing);
         let tree = KdTree::new(&model.points);
         let is_closed = model.is_closed();
         let mean = model.normals.iter().map(|&normal| Vector3::from(normal)).sum::<Vector3<f64>>();
@@ -53,7 +58,7 @@ impl Rim {
             let [across, along] = axes_across(&normal.normalize());
             for step in 0..DIRECTIONS {
                 let (sine, cosine) = (TAU * step as f64 / DIRECTIONS as f64).sin_cos();
-                let offset = (across * cosine + along * sine) * (STEP * voxel);
+                let offset = (across * cosine + along * sine) * step_length;
                 let beside: [f64; 3] = (Vector3::from(sample.place.map(f64::from)) + offset).into();
                 if tree.nearest(beside, CLEARANCE * voxel).is_none() {
                     from.push(number);
@@ -64,11 +69,12 @@ impl Rim {
         Self { from, points, too_much: if is_closed { TOO_MUCH } else { TOO_MUCH_OF_VIEW } }
     }
 
-    /// 1 where the scene ends with the model under T_scene_model, 0 where it goes on, or between.
+    /// Share of the rim where the scene goes on beyond the model under T_scene_model; 0 where it ends with it, and where
+    /// too little of the rim is seen.
     ///
     /// `is_touching` says which samples of the model lie on the scene's surface: where the model is hidden its rim does
     /// not count. `is_free` says which samples of the scene no other instance explains.
-    pub fn ends(
+    pub fn going_on(
         &self,
         transform: &RigidTransform,
         is_touching: &[bool],
@@ -90,9 +96,6 @@ impl Rim {
                     usize::from(f64::from(dot(&gap, &point.normal).abs()) < MAX_RESIDUAL * scene.voxel);
             }
         }
-        if asked < MIN_POINTS {
-            return 1.0;
-        }
-        (1.0 - going_on as f64 / asked as f64 / self.too_much).max(0.0)
+        if asked < MIN_POINTS { 0.0 } else { going_on as f64 / asked as f64 }
     }
 }

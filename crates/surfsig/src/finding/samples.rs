@@ -11,7 +11,7 @@ use crate::voxels::voxel_of;
 use crate::{
     Error, ExtractOptions, FieldOptions, FieldPlaces, Monitor, Queries, Radius, voxel_representatives,
 };
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -21,12 +21,17 @@ const NORMAL_BALL: f64 = 3.0;
 const UNKNOWNS: f64 = 6.0;
 /// Voxels along a patch's radius to which points are thinned before patches are described.
 const DESCRIPTION_VOXELS: f64 = 24.0;
-/// Places with a signature along a patch's radius.
-const PLACES_PER_RADIUS: f64 = 4.0;
+/// Places with a signature along a patch's radius, in models.
+pub(super) const PLACES_OF_MODEL: f64 = 4.0;
+/// The same in scenes: each has a place of the model near it.
+pub(super) const PLACES_OF_SCENE: f64 = 2.5;
 /// Cells along a patch's radius in which normals are compared.
 const CELLS_PER_RADIUS: i64 = 2;
-/// Length of the mean normal around a cell from which on it is flat: of a cap of a sphere of eleven patch radii.
-const FLAT: f64 = 0.998;
+/// Standard deviation of the samples around a cell from their plane, in radii of a patch, up to which it is flat: as on
+/// a cap of a sphere of ten patch radii.
+const FLAT: f64 = 0.03;
+/// The same in the scan's noise: what is bent less cannot be told from a plane.
+const FLAT_IN_NOISE: f64 = 2.5;
 /// Points that tell the noise of all.
 const MEASURED: usize = 2000;
 /// Voxels along a patch's radius between points whose sides are told from each other's.
@@ -41,7 +46,7 @@ pub(super) struct Samples {
 
 impl Samples {
     /// Those of a scan, whose viewpoint or directions say on which side its normals are.
-    pub fn new(scan: &CenteredScan, voxel: f64, monitor: &Monitor) -> Result<Self, Error> {
+    pub fn new(scan: &CenteredScan, voxel: f64, noise: f64, monitor: &Monitor) -> Result<Self, Error> {
         let ball = Radius::new(NORMAL_BALL * voxel)?;
         let thinned = scan.thinned(voxel);
         let given = thinned.scan();
@@ -51,12 +56,14 @@ impl Samples {
         let known = (0..found.len()).filter(|&i| found.normals[i].iter().all(|c| c.is_finite()));
         let point =
             |i: usize| SurfacePlace { place: thinned.points[i].map(|x| x as f32), normal: found.normals[i] };
-        Ok(Self { points: known.map(point).collect(), noise: noise(scan, ball, monitor)? })
+        Ok(Self { points: known.map(point).collect(), noise })
     }
 }
 
-/// Standard deviation of the points from the surface in a ball; the median of some.
-fn noise(scan: &CenteredScan, ball: Radius, monitor: &Monitor) -> Result<f64, Error> {
+/// Standard deviation of the points from the surface around them, in balls for samples one voxel apart; the median of
+/// some.
+pub(super) fn noise(scan: &CenteredScan, voxel: f64, monitor: &Monitor) -> Result<f64, Error> {
+    let ball = Radius::new(NORMAL_BALL * voxel)?;
     let some: Vec<u32> = some_of(scan.points.len(), MEASURED).into_iter().map(|i| i as u32).collect();
     let cloud = scan.scan().cloud;
     let options = ExtractOptions::default();
@@ -72,14 +79,15 @@ fn noise(scan: &CenteredScan, ball: Radius, monitor: &Monitor) -> Result<f64, Er
 /// Places all over a scan with their signatures, but where its surface is flat: a patch of a plane is nowhere.
 pub(super) fn described(
     scan: &CenteredScan,
-    samples: &[SurfacePlace],
+    samples: &Samples,
     radius: f64,
+    places_per_radius: f64,
     monitor: &Monitor,
 ) -> Result<FieldPlaces, Error> {
-    let cells = NormalCells::new(samples, radius);
+    let cells = BentCells::new(samples, radius);
     let thinned = scan.thinned(radius / DESCRIPTION_VOXELS).some(|point| cells.is_around(point));
     let given = thinned.scan();
-    let mut indices = voxel_representatives(&given.cloud, Radius::new(radius / PLACES_PER_RADIUS)?)?;
+    let mut indices = voxel_representatives(&given.cloud, Radius::new(radius / places_per_radius)?)?;
     indices.retain(|&i| cells.is_bent(&thinned.points[i as usize]));
     let points: Vec<[f64; 3]> = indices.iter().map(|&i| thinned.points[i as usize]).collect();
     let options =
@@ -90,33 +98,72 @@ pub(super) fn described(
 }
 
 /// Where a surface is bent, in cells of a part of a patch's radius.
-struct NormalCells {
+struct BentCells {
     edge: f64,
-    /// Cells around which normals differ.
+    /// Cells around which samples are off a plane.
     bent: FxHashSet<[i64; 3]>,
     /// Those and the cells that patches there reach.
     around: FxHashSet<[i64; 3]>,
 }
 
-impl NormalCells {
-    fn new(samples: &[SurfacePlace], radius: f64) -> Self {
+/// Count, sum, and second moments of some points about the middle of their cell, which keeps digits.
+#[derive(Clone, Copy)]
+struct Spread {
+    count: f64,
+    sum: Vector3<f64>,
+    squares: Matrix3<f64>,
+}
+
+impl Spread {
+    const NONE: Self = Self {
+        count: 0.0,
+        sum: Vector3::new(0.0, 0.0, 0.0),
+        squares: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    };
+
+    fn add(&mut self, point: Vector3<f64>) {
+        self.count += 1.0;
+        self.sum += point;
+        self.squares += point * point.transpose();
+    }
+
+    /// Adds points that are about a middle `offset` away.
+    fn join(&mut self, other: &Self, offset: Vector3<f64>) {
+        let cross = other.sum * offset.transpose();
+        self.count += other.count;
+        self.sum += other.sum + offset * other.count;
+        self.squares += other.squares + cross + cross.transpose() + offset * offset.transpose() * other.count;
+    }
+
+    /// Standard deviation from their plane.
+    fn thickness(&self) -> f64 {
+        let mean = self.sum / self.count;
+        let covariance = self.squares / self.count - mean * mean.transpose();
+        covariance.symmetric_eigenvalues().min().max(0.0).sqrt()
+    }
+}
+
+impl BentCells {
+    fn new(samples: &Samples, radius: f64) -> Self {
         let edge = radius / CELLS_PER_RADIUS as f64;
-        let mut sums: FxHashMap<[i64; 3], (Vector3<f64>, f64)> = FxHashMap::default();
-        for sample in samples {
-            let cell = voxel_of(&sample.place.map(f64::from), edge);
-            let (sum, count) = sums.entry(cell).or_insert((Vector3::zeros(), 0.0));
-            *sum += Vector3::from(sample.normal.map(f64::from));
-            *count += 1.0;
+        let mut spreads: FxHashMap<[i64; 3], Spread> = FxHashMap::default();
+        for sample in &samples.points {
+            let point = sample.place.map(f64::from);
+            let cell = voxel_of(&point, edge);
+            let middle = Vector3::from(cell.map(|x| x as f64 * edge));
+            spreads.entry(cell).or_insert(Spread::NONE).add(Vector3::from(point) - middle);
         }
+        let flat = (FLAT * radius).max(FLAT_IN_NOISE * samples.noise);
         let is_bent = |cell: &[i64; 3]| {
-            let (mut total, mut number) = (Vector3::zeros(), 0.0);
-            for (sum, count) in block(*cell, CELLS_PER_RADIUS).filter_map(|other| sums.get(&other)) {
-                total += sum;
-                number += count;
+            let mut total = Spread::NONE;
+            for other in block(*cell, CELLS_PER_RADIUS) {
+                if let Some(spread) = spreads.get(&other) {
+                    total.join(spread, Vector3::from([0, 1, 2].map(|k| (other[k] - cell[k]) as f64 * edge)));
+                }
             }
-            total.norm() < FLAT * number
+            total.thickness() > flat
         };
-        let cells: Vec<[i64; 3]> = sums.keys().copied().collect();
+        let cells: Vec<[i64; 3]> = spreads.keys().copied().collect();
         let bent: FxHashSet<[i64; 3]> = cells.par_iter().filter(|cell| is_bent(cell)).copied().collect();
         let is_around = |cell: &[i64; 3]| {
             bent.contains(cell) || block(*cell, CELLS_PER_RADIUS + 1).any(|other| bent.contains(&other))
@@ -183,8 +230,9 @@ mod tests {
             .chain(wall)
             .map(|(place, normal)| SurfacePlace { place: place.map(|x| x as f32), normal })
             .collect();
-        let cells = NormalCells::new(&samples, 1.0);
-        for sample in &samples {
+        let samples = Samples { points: samples, noise: 0.0 };
+        let cells = BentCells::new(&samples, 1.0);
+        for sample in &samples.points {
             let point = sample.place.map(f64::from);
             let to_bend = (10.0 - point[0]).max(point[2]);
             // A patch of radius 1 that reaches the bend, and none that is far from doing so.
@@ -204,8 +252,9 @@ mod tests {
         let scan = CenteredScan::new(
             &crate::Scan::new(crate::PointCloud::new_f64(&points)).seen_from([30.0, 30.0, 1e3]),
         );
-        let found = Samples::new(&scan, 2.0, &Monitor::default()).unwrap();
-        assert!((found.noise - 0.2).abs() < 0.02, "{}", found.noise);
+        let noise = noise(&scan, 2.0, &Monitor::default()).unwrap();
+        assert!((noise - 0.2).abs() < 0.02, "{noise}");
+        let found = Samples::new(&scan, 2.0, noise, &Monitor::default()).unwrap();
         // The surface is in one layer of voxels or in two.
         assert!((800..2000).contains(&found.points.len()), "{}", found.points.len());
         assert!(found.points.iter().all(|sample| sample.normal[2] > 0.8));

@@ -2,7 +2,7 @@
 
 use super::FindSettings;
 use super::model::Model;
-use super::samples::{Samples, described, oriented_outwards};
+use super::samples::{PLACES_OF_SCENE, Samples, described, noise, oriented_outwards};
 use crate::alignment::OrientedSurface;
 use crate::depth_image::{DepthImage, SurfacePlace};
 use crate::scan::CenteredScan;
@@ -17,11 +17,13 @@ use std::sync::Arc;
 pub(super) struct SceneSurface {
     pub surface: OrientedSurface,
     pub voxel: f64,
+    /// Between the points of the scan.
+    pub spacing: f64,
 }
 
 impl SceneSurface {
-    pub fn new(samples: Vec<SurfacePlace>, voxel: f64) -> Self {
-        Self { surface: OrientedSurface::new(samples), voxel }
+    pub fn new(samples: Vec<SurfacePlace>, voxel: f64, spacing: f64) -> Self {
+        Self { surface: OrientedSurface::new(samples), voxel, spacing }
     }
 
     pub fn samples(&self) -> &[SurfacePlace] {
@@ -55,6 +57,7 @@ pub(super) struct Scene<'a> {
     pub viewpoint: Option<[f64; 3]>,
     settings: &'a FindSettings,
     monitor: &'a Monitor,
+    noises: Vec<(f64, f64)>,
     samples: Vec<(f64, Arc<Samples>)>,
     surfaces: Vec<(f64, Arc<SceneSurface>)>,
     places: Vec<(f64, Arc<FieldPlaces>)>,
@@ -82,6 +85,7 @@ impl<'a> Scene<'a> {
             viewpoint,
             settings,
             monitor,
+            noises: Vec::new(),
             samples: Vec::new(),
             surfaces: Vec::new(),
             places: Vec::new(),
@@ -91,7 +95,7 @@ impl<'a> Scene<'a> {
     /// Distance between the samples in which a model is looked for.
     pub fn voxel(&mut self, model: &Model) -> Result<f64, Error> {
         let voxel = model.voxel().max(model.spacing).max(self.settings.spacings_per_voxel * self.spacing);
-        Ok(voxel.max(self.settings.noises_per_voxel * self.samples(voxel)?.noise))
+        Ok(voxel.max(self.settings.noises_per_voxel * self.noise(voxel)?))
     }
 
     /// Its places with signatures of patches of a radius; `voxel` is that of the samples that tell where it is flat.
@@ -100,16 +104,26 @@ impl<'a> Scene<'a> {
             return Ok(Arc::clone(known));
         }
         let samples = self.samples(voxel)?;
-        let places = Arc::new(described(&self.scan, &samples.points, radius, self.monitor)?);
+        let places = Arc::new(described(&self.scan, &samples, radius, PLACES_OF_SCENE, self.monitor)?);
         self.places.push((radius, Arc::clone(&places)));
         Ok(places)
+    }
+
+    fn noise(&mut self, voxel: f64) -> Result<f64, Error> {
+        if let Some((_, known)) = self.noises.iter().find(|(of, _)| *of == voxel) {
+            return Ok(*known);
+        }
+        let noise = noise(&self.scan, voxel, self.monitor)?;
+        self.noises.push((voxel, noise));
+        Ok(noise)
     }
 
     fn samples(&mut self, voxel: f64) -> Result<Arc<Samples>, Error> {
         if let Some((_, known)) = self.samples.iter().find(|(of, _)| *of == voxel) {
             return Ok(Arc::clone(known));
         }
-        let samples = Arc::new(Samples::new(&self.scan, voxel, self.monitor)?);
+        let noise = self.noise(voxel)?;
+        let samples = Arc::new(Samples::new(&self.scan, voxel, noise, self.monitor)?);
         self.samples.push((voxel, Arc::clone(&samples)));
         Ok(samples)
     }
@@ -120,18 +134,18 @@ impl<'a> Scene<'a> {
             return Ok(Arc::clone(known));
         }
         let samples = self.samples(voxel)?;
-        let surface = Arc::new(SceneSurface::new(samples.points.clone(), voxel));
+        let surface = Arc::new(SceneSurface::new(samples.points.clone(), voxel, self.spacing));
         self.surfaces.push((voxel, Arc::clone(&surface)));
         Ok(surface)
     }
 
-    /// The same with the larger voxels of the first judgement, from the samples of the last.
-    pub fn coarse_surface(&mut self, voxel: f64) -> Result<Arc<SceneSurface>, Error> {
-        let coarse = self.settings.coarse_voxels * voxel;
+    /// The same with larger voxels, from the samples of the fine one.
+    pub fn thinned_surface(&mut self, voxel: f64, coarse: f64) -> Result<Arc<SceneSurface>, Error> {
         if let Some((_, known)) = self.surfaces.iter().find(|(of, _)| *of == coarse) {
             return Ok(Arc::clone(known));
         }
-        let surface = Arc::new(SceneSurface::new(thinned(&self.samples(voxel)?.points, coarse), coarse));
+        let surface =
+            Arc::new(SceneSurface::new(thinned(&self.samples(voxel)?.points, coarse), coarse, self.spacing));
         self.surfaces.push((coarse, Arc::clone(&surface)));
         Ok(surface)
     }

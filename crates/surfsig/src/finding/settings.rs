@@ -11,8 +11,20 @@ use crate::alignment::{PointToSurfaceSettings, RivalSettings, ScaleLimits};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct FindSettings {
-    /// Score of an instance, at least: half hidden ones have about 0.4, and what is not there below 0.2.
+    /// Probability that an instance is right, at least.
     pub min_score: f64,
+    /// Instances of all models that are given at most, the most probable ones.
+    pub at_most: usize,
+    /// Places of the model that are matched with each place of the scene.
+    pub similar: usize,
+    /// Points of the model by which all transforms that matches propose are judged, without alignment, where the scene's
+    /// viewpoint is known.
+    pub rough_points: usize,
+    /// Voxels of that judgement in the model's extent: what a match's transform is off.
+    pub rough_voxel: f64,
+    /// Of the model's reach, and radians, within which two of these transforms are the same: alignment brings them to
+    /// one.
+    pub rough_same: [f64; 2],
     /// Proposed transforms that are judged by few points. With 600, 80 points each and 150 kept, 15 of the 30 half
     /// hidden figures and frusta of seeds 1 to 3 of `benchmarks/finding.py` are found, in place of 22; with 1500 and
     /// 450 kept no more.
@@ -72,7 +84,12 @@ pub struct FindSettings {
     pub rivals: RivalSettings,
     /// Distance from the model, in radii of a patch, from which rivals are fitted: as in registration.
     pub rival_distance: f64,
-    /// Share of the score that a rival may lack: halves of a symmetric model differ by that in noise.
+    /// By how much the logarithm of the odds grows with the share of the model that is confirmed, where nobody knows what
+    /// the sensor saw through.
+    pub log_odds_per_share: f64,
+    /// That share at which right and wrong are as probable then.
+    pub share_of_even_odds: f64,
+    /// Share of the support that a rival may lack: halves of a symmetric model differ by that in noise.
     pub rival_deficit: f64,
     /// The logarithm of a scale from which on it is doubted, as in registration.
     pub doubted_scale: f64,
@@ -85,7 +102,12 @@ pub struct FindSettings {
 impl Default for FindSettings {
     fn default() -> Self {
         Self {
-            min_score: 0.25,
+            min_score: 0.5,
+            at_most: usize::MAX,
+            similar: 5,
+            rough_points: 100,
+            rough_voxel: 0.08,
+            rough_same: [0.12, 0.35],
             proposals: 1000,
             first_points: 100,
             first_distances: (4.0, 2.5, 4),
@@ -117,6 +139,8 @@ impl Default for FindSettings {
             agreement_by_chance: [0.5, 0.75],
             rivals: RivalSettings::default(),
             rival_distance: 0.55,
+            log_odds_per_share: 20.0,
+            share_of_even_odds: 0.25,
             rival_deficit: 0.15,
             doubted_scale: ScaleLimits::DEFAULT.doubted,
             scale_deviations: ScaleLimits::DEFAULT.deviations,

@@ -112,6 +112,7 @@ fn model_of(samples: Vec<([f64; 3], Vector3<f64>)>) -> Model {
         samples,
         normals,
         places: FieldPlaces::new(1.0),
+        larger_places: Vec::new(),
         is_sided: true,
     }
 }
@@ -123,26 +124,26 @@ fn square(columns: std::ops::Range<i32>, rows: std::ops::Range<i32>) -> Vec<([f6
 
 fn surface_of(model: &Model, voxel: f64) -> Arc<SceneSurface> {
     let all: Vec<usize> = (0..model.samples.len()).collect();
-    Arc::new(SceneSurface::new(model.surface(&all), voxel))
+    Arc::new(SceneSurface::new(model.surface(&all), voxel, 0.3 * voxel))
 }
 
 #[test]
 fn a_model_ends_where_the_scene_does() {
     let model = model_of(square(0..20, 0..20));
     let samples = model.surface(&(0..400).collect::<Vec<_>>());
-    let rim = Rim::new(&model, &samples, 1.0);
-    let ends = |scene: Vec<([f64; 3], Vector3<f64>)>, is_touching: bool, is_free: bool| {
+    let rim = Rim::new(&model, &samples, 1.0, 0.4);
+    let going_on = |scene: Vec<([f64; 3], Vector3<f64>)>, is_touching: bool, is_free: bool| {
         let scene = surface_of(&model_of(scene), 1.0);
         let free = vec![is_free; scene.samples().len()];
-        rim.ends(&RigidTransform::identity(), &[is_touching; 400], &scene, &free)
+        rim.going_on(&RigidTransform::identity(), &[is_touching; 400], &scene, &free)
     };
-    assert_eq!(ends(square(0..20, 0..20), true, true), 1.0);
-    assert_eq!(ends(square(-9..29, -9..29), true, true), 0.0, "it lies in a larger square");
-    assert_eq!(ends(square(-9..29, -9..29), false, true), 1.0, "nothing of it is seen");
-    assert_eq!(ends(square(-9..29, -9..29), true, false), 1.0, "another instance is beside it");
+    assert_eq!(going_on(square(0..20, 0..20), true, true), 0.0);
+    assert_eq!(going_on(square(-9..29, -9..29), true, true), 1.0, "it lies in a larger square");
+    assert_eq!(going_on(square(-9..29, -9..29), false, true), 0.0, "nothing of it is seen");
+    assert_eq!(going_on(square(-9..29, -9..29), true, false), 0.0, "another instance is beside it");
     // To the right the scene goes on: a share of the rim that a slow search counts, too.
     let wider = square(0..29, 0..20);
-    let (mut asked, mut going_on) = (0.0, 0.0);
+    let (mut asked, mut gone_on) = (0.0, 0.0);
     for (point, _) in square(0..20, 0..20) {
         for step in 0..8 {
             let (sine, cosine) = (PI / 4.0 * f64::from(step)).sin_cos();
@@ -152,12 +153,12 @@ fn a_model_ends_where_the_scene_does() {
             };
             if !near(&square(0..20, 0..20), 1.5) {
                 asked += 1.0;
-                going_on += f64::from(u8::from(near(&wider, 1.0)));
+                gone_on += f64::from(u8::from(near(&wider, 1.0)));
             }
         }
     }
-    let expected: f64 = 1.0 - going_on / asked / 0.8;
-    assert!((ends(wider, true, true) - expected).abs() < 0.02, "{expected}");
+    let expected: f64 = gone_on / asked;
+    assert!((going_on(wider, true, true) - expected).abs() < 0.02, "{expected}");
 }
 
 #[test]
@@ -185,10 +186,10 @@ fn evidence_without_a_viewpoint_is_what_touches() {
     let share = touching as f64 / model.samples.len() as f64;
     assert!((there.overlap - share).abs() < 2.0 / model.samples.len() as f64, "{} {share}", there.overlap);
     assert_eq!(there.visible, there.overlap);
-    assert!(there.score > 0.4, "{}", there.score);
-    assert_eq!((far.score, far.overlap), (0.0, 0.0));
+    assert!(there.score() > 0.9, "{}", there.score());
+    assert_eq!((far.score(), far.support, far.overlap), (0.0, 0.0, 0.0));
     let none = vec![false; scene.samples.len()];
-    assert_eq!(view.judged(&[off], &none)[0].score, 0.0, "another instance explains all");
+    assert_eq!(view.judged(&[off], &none)[0].score(), 0.0, "another instance explains all");
 }
 
 #[test]
@@ -207,8 +208,12 @@ fn free_space_speaks_against_what_is_not_there() {
     let above = RigidTransform::from_rotation_vector([0.4, -1.0, 0.7], [-2.5, 0.3, 2.0]);
     let transforms = [about(poses[0]), about(poses[1]), about(above)];
     let judged = view.judged(&transforms, &vec![true; surface.samples().len()]);
-    assert!(judged[0].score > 0.5 && judged[1].score > 0.5, "{judged:?}");
-    assert!(judged[2].score < 0.0, "{judged:?}");
+    assert!(judged[0].support > 0.5 && judged[1].support > 0.5, "{judged:?}");
+    assert!(judged[0].score() > 0.5 && judged[1].score() > 0.5, "{judged:?}");
+    assert!(judged[2].support < 0.0 && judged[2].score() == 0.0, "{judged:?}");
+    // The judgement that costs little says the same of the support.
+    let supports = view.supports(&transforms);
+    assert!(supports.iter().zip(&judged).all(|(cheap, full)| *cheap == full.support), "{supports:?}");
 }
 
 #[test]

@@ -1,0 +1,104 @@
+"""Models from files: meshes become points of their outer surface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfsig import _surfsig
+from surfsig.errors import InvalidInputError
+from surfsig.files import read
+from surfsig.point_cloud import PointCloud
+from surfsig.spacing import point_spacing
+
+MODEL_SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".pcd", ".xyz", ".npz")
+"""Names of files of a folder that are models."""
+SURFACE_SAMPLES = 20_000
+"""Points spread over a mesh: 2 mm apart on an object of 150 mm."""
+_VIEWS = 120
+"""Directions from which it is tried whether a point can be seen: 20 degrees apart."""
+_ONE_SIDE = 0.5
+"""Share by which more is seen of one side of a point than of the other, so that it is the outer one."""
+_NORMALS = ("nx", "ny", "nz")
+
+
+def model_files(paths: Iterable[Path]) -> dict[str, Path]:
+    """Name the models in files and folders: each by its file's name without ending.
+
+    Raises
+    ------
+    InvalidInputError
+        If a folder has no model, or two files have one name.
+    """
+    found: dict[str, Path] = {}
+    for path in paths:
+        files = [path]
+        if path.is_dir():
+            files = sorted(file for file in path.iterdir() if file.suffix.lower() in MODEL_SUFFIXES)
+            if not files:
+                raise InvalidInputError(f"{path}: a folder without models ({', '.join(MODEL_SUFFIXES)})")
+        for file in files:
+            if file.stem in found:
+                raise InvalidInputError(f"{file}: has the same name as {found[file.stem]}")
+            found[file.stem] = file
+    return found
+
+
+def read_model(path: Path, **reading: Any) -> PointCloud:
+    """Read a model: of a mesh, points spread over what can be seen of its surface; of a cloud, its points."""
+    if reading.get("samples") is None:
+        try:
+            return outer_surface(read(path, **{**reading, "samples": SURFACE_SAMPLES}))
+        except InvalidInputError:
+            # It is no mesh, or one without faces.
+            return read(path, **reading)
+    return outer_surface(read(path, **reading))
+
+
+def outer_surface(cloud: PointCloud) -> PointCloud:
+    """Leave out the points of a whole object that no sensor sees from anywhere, as of parts inside.
+
+    A point counts as seen where nothing is before it from one of many directions that are spread over the
+    sphere. Its normal, if it has one, is turned to the side from which it is seen; where that is both, it
+    stays.
+    """
+    finite = cloud.at(np.flatnonzero(cloud.finite))
+    points = np.ascontiguousarray(finite.points - finite.points.mean(axis=0), np.float64)
+    spacing = point_spacing(points)
+    if len(points) == 0 or spacing == 0.0:
+        return finite
+    seen = np.zeros(len(points), np.bool_)
+    towards, total = np.zeros(len(points)), np.zeros(len(points))
+    has_normals = all(name in finite.fields for name in _NORMALS)
+    normals = np.stack([finite.fields[name] for name in _NORMALS], axis=1) if has_normals else None
+    for direction in _directions():
+        u = np.cross(direction, [1.0, 0.0, 0.0] if abs(direction[0]) < 0.9 else [0.0, 1.0, 0.0])
+        u /= np.linalg.norm(u)
+        across = [u.tolist(), np.cross(direction, u).tolist()]
+        visible = ~_surfsig.hidden_from(direction.tolist(), across, points, points, spacing)
+        seen |= visible
+        if normals is not None:
+            cosine = np.where(visible, normals @ direction, 0.0)
+            towards += cosine
+            total += np.abs(cosine)
+    kept = finite.at(np.flatnonzero(seen))
+    if normals is not None:
+        side = np.where(towards < -_ONE_SIDE * total, -1.0, 1.0)[seen]
+        fields = dict(kept.fields)
+        for axis, name in enumerate(_NORMALS):
+            fields[name] = (side * normals[seen, axis]).astype(np.float32)
+        kept = PointCloud(kept.offsets, origin=kept.origin, fields=fields)
+    return kept
+
+
+def _directions() -> NDArray[np.float64]:
+    """Give unit vectors spread over the sphere by the golden angle."""
+    number = np.arange(_VIEWS)
+    z = 1.0 - (2 * number + 1) / _VIEWS
+    angle = np.pi * (3.0 - np.sqrt(5.0)) * number
+    across = np.sqrt(1.0 - z * z)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
