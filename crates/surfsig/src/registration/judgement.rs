@@ -20,6 +20,15 @@ pub(super) struct Judge<'a> {
     pub settings: &'a RegistrationSettings,
 }
 
+/// What speaks for a transform.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Support {
+    /// The matches that agree; `None` where a start was given.
+    pub inliers: Option<usize>,
+    /// Whether, of all transforms that take faces onto faces, both sensors allow this one only.
+    pub is_exclusive: bool,
+}
+
 /// What the tests said of a transform.
 pub(super) struct Judgement {
     pub doubts: Vec<Doubt>,
@@ -34,14 +43,8 @@ pub(super) struct Judgement {
 }
 
 impl Judge<'_> {
-    /// Judges a transform beside others that were proposed; `inliers` are the matches that agree, `None` where a start
-    /// was given.
-    pub fn judged(
-        &self,
-        found: &PointToSurface,
-        proposed: &[RigidTransform],
-        inliers: Option<usize>,
-    ) -> Judgement {
+    /// Judges a transform beside others that were proposed.
+    pub fn judged(&self, found: &PointToSurface, proposed: &[RigidTransform], support: Support) -> Judgement {
         let settings = self.settings;
         let numbers = some_of(self.sample.len(), settings.rivals.points);
         let some: Vec<[f64; 3]> = numbers.into_iter().map(|i| self.sample[i]).collect();
@@ -106,21 +109,26 @@ impl Judge<'_> {
             (judged.scale, judged.scale_standard_error) = (scale.scale, scale.standard_error);
         }
         judged.doubts.extend(doubt);
-        self.doubt(found, inliers, &mut judged);
+        self.doubt(found, support, &mut judged);
         judged
     }
 
-    fn doubt(&self, found: &PointToSurface, inliers: Option<usize>, judged: &mut Judgement) {
+    fn doubt(&self, found: &PointToSurface, support: Support, judged: &mut Judgement) {
         let settings = self.settings;
         let doubts = &mut judged.doubts;
-        let is_certain = judged.free_space <= settings.free_space.certain_share
-            && judged.explained >= settings.certain_explained;
-        let needed = if is_certain { settings.certain_inliers } else { settings.trusted_inliers };
-        if let Some(inliers) = inliers.filter(|&inliers| inliers < needed) {
+        let is_free = judged.free_space <= settings.free_space.certain_share;
+        let needed = if is_free && support.is_exclusive {
+            0
+        } else if is_free && judged.explained >= settings.certain_explained {
+            settings.certain_inliers
+        } else {
+            settings.trusted_inliers
+        };
+        if let Some(inliers) = support.inliers.filter(|&inliers| inliers < needed) {
             doubts.push(Doubt::FewMatches { inliers, needed });
         }
         let overlap = found.overlap;
-        let least = match inliers {
+        let least = match support.inliers {
             None => settings.trusted_overlap_of_start,
             Some(_) => settings.trusted_overlap,
         };

@@ -2,22 +2,26 @@
 //!
 //! Keypoints are matched by their field signatures ([`crate::match_fields`]), the matches agree on a transform
 //! ([`crate::ConsensusSettings`]), generalised ICP refines it ([`crate::gicp`]), the last steps fit points to the
-//! surface and tell how sure it is, and then it is tried to refute the result ([`Doubt`]).
+//! surface and tell how sure it is, and then it is tried to refute the result ([`Doubt`]). Where matches prove nothing,
+//! faces of buildings propose transforms ([`FaceSettings`]), of which free space chooses.
 
+mod face_search;
 mod free_space;
 mod judgement;
 mod result;
 mod settings;
+mod trial;
 
 pub use result::Registration;
-pub use settings::{FreeSpaceSettings, RegistrationSettings};
+pub use settings::{FaceSettings, FreeSpaceSettings, RegistrationSettings};
 
 use free_space::BothSensors;
 use judgement::{Judge, Judgement};
+use trial::{Trial, Tried};
 
 use crate::alignment::{
-    Alternative, Correspondences, Doubt, GicpCloud, GicpSettings, PointToSurface, TargetSurface, even_sample,
-    gicp, infinite_along, information_without,
+    Alternative, Correspondences, Doubt, GicpCloud, TargetSurface, even_sample, infinite_along,
+    information_without,
 };
 use crate::field::{KeypointOptions, keypoints_within, match_fields};
 use crate::geometry::RigidTransform;
@@ -28,6 +32,9 @@ use crate::{Error, FieldOptions, FieldPlaces, Monitor, PointCloud, Radius, Scan,
 
 /// Steps of which [`Monitor::done`] counts each.
 pub const REGISTRATION_STEPS: usize = 5;
+
+/// Matches without which they propose no transform: three places determine one.
+const MIN_MATCHES: usize = 3;
 
 /// Finds how a source lies in a target, from any start; or refines `start` (T_target_source) where one is given.
 ///
@@ -97,54 +104,50 @@ fn registered(
             let thinned =
                 [source, target].map(|scan| scan.thinned(radius / settings.description_voxels_per_radius));
             let matches = matched(&thinned[0], &thinned[1], patch, settings, monitor)?;
-            if matches.len() < 3 {
-                return Ok(Registration::nothing(radius, matches.len()));
-            }
             let rivals = settings.rivals;
             let distance = rivals.distance * radius;
-            let proposals = matches.agreed_transforms(rivals.proposals, rivals.least_score, distance);
+            let proposals = if matches.len() < MIN_MATCHES {
+                Vec::new()
+            } else {
+                matches.agreed_transforms(rivals.proposals, rivals.least_score, distance)
+            };
             (proposals, Some(matches))
         }
     };
     let count = matches.as_ref().map_or(0, Correspondences::len);
     monitor.check()?;
     let voxel = radius / settings.voxels_per_radius;
-    let [ours, theirs] = [source, target].map(|scan| voxel_means(&scan.points, voxel));
-    if ours.len().min(theirs.len()) < settings.min_voxels {
+    let clouds = [source, target].map(|scan| GicpCloud::new(voxel_means(&scan.points, voxel)));
+    let [ours, theirs] = [0, 1].map(|side: usize| clouds[side].len());
+    if ours.min(theirs) < settings.min_voxels {
         return Ok(Registration::nothing(radius, count));
     }
-    let sample = even_sample(&source.points, ours.len().min(settings.max_points), voxel);
-    let surface = TargetSurface::new(even_sample(&target.points, theirs.len(), voxel), voxel);
+    let sample = even_sample(&source.points, ours.min(settings.max_points), voxel);
+    let surface = TargetSurface::new(even_sample(&target.points, theirs, voxel), voxel);
     monitor.add(1);
-    monitor.check()?;
-    let refined = refined(ours, theirs, proposals[0], voxel, settings);
-    monitor.add(1);
-    monitor.check()?;
-    let Some(mut found) = surface.align(&sample, refined, &settings.point_to_surface) else {
+    let trial = Trial {
+        judge: Judge {
+            surface: &surface,
+            sample: &sample,
+            sensors: BothSensors::new(
+                [source, target],
+                [&sample, surface.points()],
+                voxel,
+                settings.free_space,
+            ),
+            radius,
+            settings,
+        },
+        clouds: &clouds,
+        voxel,
+        matches: matches.as_ref(),
+        monitor,
+    };
+    let Some(Tried { found, mut judged, support }) = trial.best(&proposals)? else {
         return Ok(Registration::nothing(radius, count));
     };
-    monitor.check()?;
-    let judge = Judge {
-        surface: &surface,
-        sample: &sample,
-        sensors: BothSensors::new([source, target], [&sample, surface.points()], voxel, settings.free_space),
-        radius,
-        settings,
-    };
-    let inliers_of =
-        |found: &PointToSurface| matches.as_ref().map(|matches| matches.inlier_count(&found.T_target_source));
-    let mut inliers = inliers_of(&found);
-    let mut judged = judge.judged(&found, &proposals[1..], inliers);
-    if let Some(better) =
-        judged.better.and_then(|better| surface.align(&sample, better, &settings.point_to_surface))
-    {
-        let others: Vec<RigidTransform> =
-            proposals[1..].iter().copied().chain([found.T_target_source]).collect();
-        inliers = inliers_of(&better);
-        judged = judge.judged(&better, &others, inliers);
-        found = better;
-    }
-    if let (true, Some(own)) = (judged.doubts.is_empty(), inliers) {
+    monitor.add(1);
+    if let (true, false, Some(own)) = (judged.doubts.is_empty(), support.is_exclusive, support.inliers) {
         let agreement = own as f64 / (count as f64 * found.overlap);
         if agreement < settings.doubted_agreement {
             let mirrored = mirrored_inliers(source, target, patch, settings, monitor)?;
@@ -170,7 +173,7 @@ fn registered(
         free_directions: free_directions.iter().map(|direction| direction.transformed(&to_target)).collect(),
         alternatives: alternatives.collect(),
         matches: count,
-        inliers: inliers.unwrap_or(0),
+        inliers: support.inliers.unwrap_or(0),
         overlap: found.overlap,
         explained: judged.explained,
         free_space: judged.free_space,
@@ -247,31 +250,4 @@ fn described(
         None => FieldOptions { viewpoint: own.viewpoint, directions: own.directions, ..Default::default() },
     };
     keypoints_within(&PointCloud::new_f64(&scan.points), radius, &keypoints, &options, &monitor.apart())
-}
-
-/// By generalised ICP, in voxels; a transform without correspondences stays as it was proposed.
-fn refined(
-    source: Vec<[f64; 3]>,
-    target: Vec<[f64; 3]>,
-    proposed: RigidTransform,
-    voxel: f64,
-    settings: &RegistrationSettings,
-) -> RigidTransform {
-    let [source, target] = [source, target].map(GicpCloud::new);
-    let mut transform = proposed;
-    for distance in settings.gicp_distances {
-        let [rotation_epsilon, translation] = settings.gicp_epsilon;
-        let round = GicpSettings {
-            max_correspondence_distance: distance * voxel,
-            max_iterations: settings.gicp_iterations,
-            rotation_epsilon,
-            translation_epsilon: translation * voxel,
-        };
-        let found = gicp(&target, &source, transform, &round);
-        if found.inliers == 0 {
-            return proposed;
-        }
-        transform = found.T_target_source;
-    }
-    transform
 }
