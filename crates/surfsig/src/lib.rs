@@ -114,7 +114,8 @@ pub use recurrences::{
     judge_poses, refine_poses,
 };
 pub use registration::{
-    FaceSettings, FreeSpaceSettings, REGISTRATION_STEPS, Registration, RegistrationSettings, register,
+    FaceSettings, FreeSpaceSettings, REGISTRATION_STEPS, Registration, RegistrationSettings,
+    free_space_share, register,
 };
 pub use resolution::{COARSEST_STEP, RESOLUTION_SAMPLES, Resolution};
 pub use scan::Scan;

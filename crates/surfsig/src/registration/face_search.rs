@@ -11,8 +11,8 @@ use rayon::prelude::*;
 
 /// Two scans about their middles, both with a viewpoint.
 pub(super) struct FaceSearch<'a> {
-    pub source: Faced<'a>,
-    pub target: Faced<'a>,
+    pub source: &'a Faced<'a>,
+    pub target: &'a Faced<'a>,
     pub sensors: &'a BothSensors<'a>,
     /// Distance between the clouds' points.
     pub voxel: f64,
@@ -35,14 +35,17 @@ impl<'a> Faced<'a> {
         Self { cloud, all, some }
     }
 
+    /// The unit normal of the point nearest to a position, on the side from which it was seen.
+    pub fn normal_near(&self, position: [f64; 3], near: f64) -> Option<Vector3<f64>> {
+        self.cloud.nearest(position, near).map(|number| self.all.normals[number as usize].into())
+    }
+
     /// The share of another scan's points that lie on this one, seen from the same side.
     fn explained(&self, other: &FacedPoints, transform: &RigidTransform, near: f64) -> f64 {
         let lies_on = |(point, normal): &(&[f64; 3], &[f64; 3])| {
             let normal = Vector3::from(transform.transform_vector(**normal));
-            let nearest = self.cloud.nearest(transform.transform_point(**point), near);
-            nearest.is_some_and(|number| {
-                normal.dot(&Vector3::from(self.all.normals[number as usize])) > SAME_SIDE
-            })
+            self.normal_near(transform.transform_point(**point), near)
+                .is_some_and(|nearest| normal.dot(&nearest) > SAME_SIDE)
         };
         let count = other.points.iter().zip(&other.normals).filter(lies_on).count();
         count as f64 / other.points.len().max(1) as f64
@@ -51,7 +54,7 @@ impl<'a> Faced<'a> {
 
 /// Cosine of the angle between the normals of one surface in both scans, at least (45 degrees): noise and edges turn
 /// them.
-const SAME_SIDE: f64 = 0.7;
+pub(super) const SAME_SIDE: f64 = 0.7;
 
 /// A transform with what speaks for it.
 #[allow(non_snake_case)]
@@ -108,13 +111,12 @@ impl FaceSearch<'_> {
     }
 
     /// Whether the first of the candidates explains much, and none of the others nearly as much, nor any of the source's
-    /// mirror image.
+    /// mirror image more.
     pub fn is_exclusive(&self, candidates: &[FaceCandidate]) -> bool {
         let [best, others @ ..] = candidates else { return false };
         let settings = &self.settings;
-        let largest = settings.rival_share * best.score;
         best.score >= settings.certain_score
-            && others.first().is_none_or(|other| other.score <= largest)
-            && self.candidates(true).first().is_none_or(|other| other.score <= largest)
+            && others.first().is_none_or(|other| other.score <= settings.rival_share * best.score)
+            && self.candidates(true).first().is_none_or(|other| other.score < best.score)
     }
 }

@@ -116,13 +116,13 @@ impl Judge<'_> {
     fn doubt(&self, found: &PointToSurface, support: Support, judged: &mut Judgement) {
         let settings = self.settings;
         let doubts = &mut judged.doubts;
-        let is_free = judged.free_space <= settings.free_space.certain_share;
-        let needed = if is_free && support.is_exclusive {
-            0
-        } else if is_free && judged.explained >= settings.certain_explained {
-            settings.certain_inliers
-        } else {
-            settings.trusted_inliers
+        let is_certain = judged.free_space <= settings.free_space.certain_share
+            && judged.explained >= settings.certain_explained;
+        let needed = match support.is_exclusive {
+            // NaN is no free space that is known.
+            true if judged.free_space <= settings.free_space.doubted_share => 0,
+            _ if is_certain => settings.certain_inliers,
+            _ => settings.trusted_inliers,
         };
         if let Some(inliers) = support.inliers.filter(|&inliers| inliers < needed) {
             doubts.push(Doubt::FewMatches { inliers, needed });

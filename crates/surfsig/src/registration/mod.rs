@@ -15,6 +15,7 @@ mod trial;
 pub use result::Registration;
 pub use settings::{FaceSettings, FreeSpaceSettings, RegistrationSettings};
 
+use face_search::Faced;
 use free_space::BothSensors;
 use judgement::{Judge, Judgement};
 use trial::{Trial, Tried};
@@ -125,20 +126,14 @@ fn registered(
     let sample = even_sample(&source.points, ours.min(settings.max_points), voxel);
     let surface = TargetSurface::new(even_sample(&target.points, theirs, voxel), voxel);
     monitor.add(1);
+    let sensors = BothSensors::new([source, target], [&sample, surface.points()], voxel, settings.free_space);
+    let sides = sensors
+        .viewpoints()
+        .map(|viewpoints| [0, 1].map(|k| Faced::new(&clouds[k], viewpoints[k], &settings.faces)));
     let trial = Trial {
-        judge: Judge {
-            surface: &surface,
-            sample: &sample,
-            sensors: BothSensors::new(
-                [source, target],
-                [&sample, surface.points()],
-                voxel,
-                settings.free_space,
-            ),
-            radius,
-            settings,
-        },
+        judge: Judge { surface: &surface, sample: &sample, sensors, radius, settings },
         clouds: &clouds,
+        sides,
         voxel,
         matches: matches.as_ref(),
         monitor,
@@ -181,6 +176,50 @@ fn registered(
         scale_standard_error: judged.scale_standard_error,
         rms: found.rms,
         radius,
+    })
+}
+
+/// The larger share of one scan's points that lie in the other sensor's free space after a transform, of those that it
+/// would have measured; NaN where no viewpoint is known from which all was seen, or nothing is in sight.
+///
+/// # Errors
+/// [`Error::Threads`]; [`Error::InvalidRadius`] for a radius that is none.
+///
+/// ```
+/// use surfsig::{free_space_share, PointCloud, RegistrationSettings, RigidTransform, Scan};
+/// let wall = |x: f64| -> Vec<[f64; 3]> {
+///     (0..3600).map(|i| [x, f64::from(i % 60) * 0.05 - 1.5, f64::from(i / 60) * 0.05 - 1.5]).collect()
+/// };
+/// let (near, far) = (wall(2.0), wall(4.0));
+/// let [near, far] = [&near, &far].map(|wall| Scan::new(PointCloud::new_f64(wall)).seen_from([0.0; 3]));
+/// let share = |source, target| {
+///     free_space_share(source, target, &RigidTransform::identity(), &RegistrationSettings::default())
+/// };
+/// assert_eq!(share(&far, &far)?, 0.0);
+/// assert!(share(&near, &far)? > 0.9, "the far wall was seen through the near one");
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+#[allow(non_snake_case)]
+pub fn free_space_share(
+    source: &Scan<'_>,
+    target: &Scan<'_>,
+    T_target_source: &RigidTransform,
+    settings: &RegistrationSettings,
+) -> Result<f64, Error> {
+    settings.radius.map(Radius::new).transpose()?;
+    with_threads(settings.threads, || {
+        let scans = [CenteredScan::new(source), CenteredScan::new(target)];
+        let size = scans[0].size().min(scans[1].size());
+        let voxel = settings.radius.unwrap_or(settings.radius_share * size) / settings.voxels_per_radius;
+        if !(voxel > 0.0) {
+            return f64::NAN;
+        }
+        let samples = [0, 1].map(|k| even_sample(&scans[k].points, settings.max_points, voxel));
+        let sensors =
+            BothSensors::new([&scans[0], &scans[1]], [&samples[0], &samples[1]], voxel, settings.free_space);
+        let [from_source, to_target] =
+            [0, 1].map(|k| RigidTransform::from_rotation_vector([0.0; 3], scans[k].center));
+        sensors.free_space(&(to_target.inverse() * *T_target_source * from_source))
     })
 }
 

@@ -181,7 +181,7 @@ pub struct FaceSettings {
     pub least_share: f64,
     /// Distance within which a point lies on the other scan, in voxels: faces are compared in steps of one.
     pub near: f64,
-    /// Share of the points in free space that refutes a transform, before it is refined.
+    /// Share of the points in free space that refutes a transform, before it is refined: true ones have none.
     pub refuting_share: f64,
     /// Share of one scan's points that the other's sensor must have in its sight, for free space to say something.
     pub least_in_sight: f64,
@@ -190,7 +190,7 @@ pub struct FaceSettings {
     /// Share of a scan that the best one must explain to be trusted: wrong ones of which nothing is in free space
     /// explained up to 0.17, right ones of scans with 30 % in common 0.22 and more.
     pub certain_score: f64,
-    /// What the next one explains over what the best one does, at most, for that to be trusted: up to 0.51 beside right
+    /// What the next one explains over what the best one does, at most, for that to be trusted: up to 0.56 beside right
     /// ones.
     pub rival_share: f64,
 }
@@ -202,7 +202,7 @@ impl Default for FaceSettings {
             translations: 8,
             least_share: 0.15,
             near: 2.0,
-            refuting_share: 0.06,
+            refuting_share: 0.03,
             least_in_sight: 0.05,
             candidates: 8,
             certain_score: 0.2,

@@ -1,16 +1,19 @@
 //! Which of the transforms that were proposed is the best one, and what its tests say.
 
-use super::face_search::{FaceSearch, Faced};
+use super::face_search::{FaceSearch, Faced, SAME_SIDE};
 use super::judgement::{Judge, Judgement, Support};
 use crate::alignment::{Correspondences, Doubt, GicpCloud, GicpSettings, PointToSurface, gicp};
 use crate::geometry::RigidTransform;
 use crate::{Error, Monitor};
+use nalgebra::Vector3;
 
 /// Two scans about their middles, with all by which transforms are refined and judged.
 pub(super) struct Trial<'a> {
     pub judge: Judge<'a>,
     /// The source and the target, one point for each voxel.
     pub clouds: &'a [GicpCloud; 2],
+    /// The same with the sides from which they were seen, where both viewpoints are known.
+    pub sides: Option<[Faced<'a>; 2]>,
     pub voxel: f64,
     /// `None` where a start was given.
     pub matches: Option<&'a Correspondences>,
@@ -44,13 +47,11 @@ impl Trial<'_> {
         if self.matches.is_none() || !(is_refuted || is_unproved) {
             return Ok(by_matches);
         }
-        let Some([from_source, from_target]) = self.judge.sensors.viewpoints() else {
-            return Ok(by_matches);
-        };
+        let Some([source, target]) = &self.sides else { return Ok(by_matches) };
         let settings = self.judge.settings;
         let search = FaceSearch {
-            source: Faced::new(&self.clouds[0], from_source, &settings.faces),
-            target: Faced::new(&self.clouds[1], from_target, &settings.faces),
+            source,
+            target,
             sensors: &self.judge.sensors,
             voxel: self.voxel,
             distance: settings.rivals.distance * self.judge.radius,
@@ -79,8 +80,8 @@ impl Trial<'_> {
     fn tried(&self, proposals: &[RigidTransform], is_exclusive: bool) -> Result<Option<Tried>, Error> {
         let Some((first, others)) = proposals.split_first() else { return Ok(None) };
         self.monitor.check()?;
-        let Judge { surface, sample, settings, radius, .. } = self.judge;
-        let align = |start: RigidTransform| surface.align(sample, start, &settings.point_to_surface);
+        let Judge { sample, settings, radius, .. } = self.judge;
+        let align = |start: RigidTransform| self.aligned(start);
         let Some(found) = align(self.refined(*first)) else { return Ok(None) };
         self.monitor.check()?;
         let moved = found.T_target_source.displacement_from(first, sample.iter().copied());
@@ -97,6 +98,24 @@ impl Trial<'_> {
         let own = support(&better, false);
         let judged = self.judge.judged(&better, &others, own);
         Ok(Some(Tried { found: better, judged, support: own }))
+    }
+
+    /// Fits the points of the sample to the surface, but for those that see the other side of it: scans from two rooms
+    /// see both sides of a wall, which would pull each other together.
+    fn aligned(&self, start: RigidTransform) -> Option<PointToSurface> {
+        let Judge { surface, sample, settings, .. } = self.judge;
+        let near = settings.point_to_surface.max_distance * self.voxel;
+        let sees_other_side = |point: &[f64; 3]| {
+            let [source, target] = self.sides.as_ref()?;
+            let own = source.normal_near(*point, near)?;
+            let other = target.normal_near(start.transform_point(*point), near)?;
+            Some(Vector3::from(start.transform_vector(own.into())).dot(&other) < -SAME_SIDE)
+        };
+        let kept: Vec<[f64; 3]> =
+            sample.iter().filter(|point| !sees_other_side(point).unwrap_or(false)).copied().collect();
+        let mut found = surface.align(&kept, start, &settings.point_to_surface)?;
+        found.overlap *= kept.len() as f64 / sample.len() as f64;
+        Some(found)
     }
 
     /// By generalised ICP, in voxels; a transform without correspondences stays as it was proposed.
