@@ -56,6 +56,10 @@ impl<'a> Faced<'a> {
 /// them.
 pub(super) const SAME_SIDE: f64 = 0.7;
 
+/// Of so many points one tells at first whether a transform is worth more; so many times the share must then lie in free
+/// space.
+const FEW: usize = 4;
+
 /// A transform with what speaks for it.
 #[allow(non_snake_case)]
 #[derive(Debug, Clone, Copy)]
@@ -72,12 +76,16 @@ impl FaceSearch<'_> {
         let offsets =
             FaceOffsets { step: self.voxel, most: settings.translations, least_share: settings.least_share };
         let proposed = face_transforms(&self.source.all, &self.target.all, offsets, mirrored);
-        let sensors = self.sensors.with_points(
-            &self.source.some.points,
-            &self.target.some.points,
-            (settings.least_in_sight * settings.points as f64) as usize,
-        );
+        // Few points refute most of them.
+        let few = [self.source, self.target].map(|side| side.some.some(settings.points / FEW));
+        let least = settings.least_in_sight * settings.points as f64;
+        let at_first = self.sensors.with_points(&few[0].points, &few[1].points, least as usize / FEW);
+        let sensors =
+            self.sensors.with_points(&self.source.some.points, &self.target.some.points, least as usize);
         let scored = |transform: &RigidTransform| -> Option<FaceCandidate> {
+            if at_first.free_space(transform) > FEW as f64 * settings.refuting_share {
+                return None;
+            }
             let free_space = sensors.free_space(transform);
             // NaN where neither sensor would have seen anything of the other's scan.
             let part = 1.0 - free_space / settings.refuting_share;
@@ -110,13 +118,17 @@ impl FaceSearch<'_> {
         chosen
     }
 
-    /// Whether the first of the candidates explains much, and none of the others nearly as much, nor any of the source's
-    /// mirror image more.
+    /// Whether the first of the candidates explains much, and none of the others nearly as much.
     pub fn is_exclusive(&self, candidates: &[FaceCandidate]) -> bool {
         let [best, others @ ..] = candidates else { return false };
         let settings = &self.settings;
-        best.score >= settings.certain_score
-            && others.first().is_none_or(|other| other.score <= settings.rival_share * best.score)
-            && self.candidates(true).first().is_none_or(|other| other.score < best.score)
+        let largest = settings.rival_share * best.score;
+        best.score >= settings.certain_score && others.first().is_none_or(|other| other.score <= largest)
+    }
+
+    /// Whether the source's mirror image explains less than the first of the candidates.
+    pub fn is_of_one_hand(&self, candidates: &[FaceCandidate]) -> bool {
+        let [best, ..] = candidates else { return false };
+        self.candidates(true).first().is_none_or(|other| other.score < best.score)
     }
 }

@@ -142,12 +142,15 @@ fn registered(
         return Ok(Registration::nothing(radius, count));
     };
     monitor.add(1);
-    if let (true, false, Some(own)) = (judged.doubts.is_empty(), support.is_exclusive, support.inliers) {
+    if let (true, false, Some(own)) = (judged.doubts.is_empty(), support.faces.is_searched, support.inliers) {
         let agreement = own as f64 / (count as f64 * found.overlap);
         if agreement < settings.doubted_agreement {
-            let mirrored = mirrored_inliers(source, target, patch, settings, monitor)?;
-            if mirrored as f64 > settings.mirrored_inliers * own as f64 {
-                judged.doubts.push(Doubt::Mirrored { inliers: mirrored });
+            let (inliers, start) = mirrored(source, target, patch, settings, monitor)?;
+            let image: Vec<[f64; 3]> = sample.iter().map(|&[x, y, z]| [-x, y, z]).collect();
+            if inliers as f64 > settings.mirrored_inliers * own as f64
+                && trial.judge.explained_of(&found, &image, start) > judged.explained
+            {
+                judged.doubts.push(Doubt::Mirrored { inliers });
             }
         }
     }
@@ -223,18 +226,19 @@ pub fn free_space_share(
     })
 }
 
-/// How many matches of the source's mirror image agree with one transform.
-fn mirrored_inliers(
+/// How many matches of the source's mirror image agree with one transform, and this.
+fn mirrored(
     source: &CenteredScan,
     target: &CenteredScan,
     patch: Radius,
     settings: &RegistrationSettings,
     monitor: &Monitor,
-) -> Result<usize, Error> {
+) -> Result<(usize, RigidTransform), Error> {
     let thinned = |scan: &CenteredScan| scan.thinned(patch.get() / settings.description_voxels_per_radius);
     let mirrored = thinned(source).mirrored();
     let matches = matched(&mirrored, &thinned(target), patch, settings, &monitor.apart())?;
-    Ok(matches.inlier_count(&matches.agreed_transform()))
+    let agreed = matches.agreed_transform();
+    Ok((matches.inlier_count(&agreed), agreed))
 }
 
 /// Matches keypoints; where it is not known for both scans from where they were seen, both sides of the source's

@@ -67,7 +67,7 @@ pub struct RegistrationSettings {
     /// Share that such a transform explains, at least: waves that come again explain a third of the wrong ones.
     pub certain_explained: f64,
     /// Matches that agree, per match and overlap, below which it is tried whether the source's mirror image fits better:
-    /// 0.2 to 0.3 of mirrored rooms, 0.33 and more of right ones.
+    /// 0.2 to 0.3 of mirrored rooms, 0.33 and more of right ones. It must also explain more of the source's points.
     pub doubted_agreement: f64,
     /// How many times as many matches of the mirror image must agree.
     pub mirrored_inliers: f64,
@@ -190,6 +190,10 @@ pub struct FaceSettings {
     /// Share of a scan that the best one must explain to be trusted: wrong ones of which nothing is in free space
     /// explained up to 0.17, right ones of scans with 30 % in common 0.22 and more.
     pub certain_score: f64,
+    /// Share of the points in free space up to which a transform is trusted that explains half (`certain_explained`) and
+    /// is better than all others that take faces onto faces: at most 0.01 of right ones in corridors with niches; 0.02
+    /// and more of wrong ones that lay a room onto one of the same size.
+    pub certain_free_space: f64,
     /// What the next one explains over what the best one does, at most, for that to be trusted: up to 0.56 beside right
     /// ones.
     pub rival_share: f64,
@@ -204,8 +208,9 @@ impl Default for FaceSettings {
             near: 2.0,
             refuting_share: 0.03,
             least_in_sight: 0.05,
-            candidates: 8,
+            candidates: 12,
             certain_score: 0.2,
+            certain_free_space: 0.01,
             rival_share: 0.6,
         }
     }

@@ -1,7 +1,7 @@
 //! Which of the transforms that were proposed is the best one, and what its tests say.
 
 use super::face_search::{FaceSearch, Faced, SAME_SIDE};
-use super::judgement::{Judge, Judgement, Support};
+use super::judgement::{Faces, Judge, Judgement, Support};
 use crate::alignment::{Correspondences, Doubt, GicpCloud, GicpSettings, PointToSurface, gicp};
 use crate::geometry::RigidTransform;
 use crate::{Error, Monitor};
@@ -37,7 +37,7 @@ impl Trial<'_> {
     /// The best of proposed transforms; where matches do not prove it, or a sensor refutes it, also of those by faces.
     /// `None` where none brings the scans together.
     pub fn best(&self, proposals: &[RigidTransform]) -> Result<Option<Tried>, Error> {
-        let by_matches = self.tried(proposals, false)?;
+        let by_matches = self.tried(proposals, Faces::default())?;
         let is_refuted = by_matches
             .as_ref()
             .is_none_or(|tried| tried.is_doubted(|doubt| matches!(doubt, Doubt::FreeSpace { .. })));
@@ -58,16 +58,14 @@ impl Trial<'_> {
             settings: settings.faces,
         };
         let candidates = search.candidates(false);
-        let is_exclusive = search.is_exclusive(&candidates);
-        if !(is_refuted || is_exclusive) {
+        if candidates.is_empty() {
             return Ok(by_matches);
         }
-        let transforms: Vec<RigidTransform> = candidates
-            .iter()
-            .map(|candidate| candidate.T_target_source)
-            .chain(proposals.iter().copied())
-            .collect();
-        let by_faces = self.tried(&transforms, is_exclusive)?;
+        let is_searched = search.is_of_one_hand(&candidates);
+        let faces = Faces { is_searched, is_exclusive: is_searched && search.is_exclusive(&candidates) };
+        let by_candidates = candidates.iter().map(|candidate| candidate.T_target_source);
+        let transforms: Vec<RigidTransform> = by_candidates.chain(proposals.iter().copied()).collect();
+        let by_faces = self.tried(&transforms, faces)?;
         let is_better = |by_faces: &Tried| {
             by_faces.judged.doubts.is_empty()
                 || is_refuted && by_faces.judged.free_space <= settings.free_space.doubted_share
@@ -75,9 +73,8 @@ impl Trial<'_> {
         Ok(by_faces.filter(is_better).or(by_matches))
     }
 
-    /// The first transform, refined and judged beside the others, or another one that is better; `is_exclusive` says that
-    /// the first one is the only one that both sensors allow.
-    fn tried(&self, proposals: &[RigidTransform], is_exclusive: bool) -> Result<Option<Tried>, Error> {
+    /// The first transform, refined and judged beside the others, or another one that is better.
+    fn tried(&self, proposals: &[RigidTransform], faces: Faces) -> Result<Option<Tried>, Error> {
         let Some((first, others)) = proposals.split_first() else { return Ok(None) };
         self.monitor.check()?;
         let Judge { sample, settings, radius, .. } = self.judge;
@@ -87,9 +84,9 @@ impl Trial<'_> {
         let moved = found.T_target_source.displacement_from(first, sample.iter().copied());
         let support = |found: &PointToSurface, is_exclusive: bool| Support {
             inliers: self.matches.map(|matches| matches.inlier_count(&found.T_target_source)),
-            is_exclusive,
+            faces: Faces { is_exclusive, ..faces },
         };
-        let own = support(&found, is_exclusive && moved <= settings.rivals.distance * radius);
+        let own = support(&found, faces.is_exclusive && moved <= settings.rivals.distance * radius);
         let judged = self.judge.judged(&found, others, own);
         let Some(better) = judged.better.and_then(align) else {
             return Ok(Some(Tried { found, judged, support: own }));
