@@ -309,6 +309,15 @@ def register(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> dict[str, Any]: ...
+def free_space_share(
+    source: _Scan,
+    target: _Scan,
+    T_target_source: list[list[float]],
+    *,
+    radius: float | None = None,
+    settings: RegistrationSettings | None = None,
+    threads: int | None = None,
+) -> float: ...
 
 @final
 class RecurrenceSettings:

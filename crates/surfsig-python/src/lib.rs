@@ -83,7 +83,9 @@ mod _surfsig {
     #[pymodule_export]
     use crate::recurrences::{PieceView, RecurrenceSettings, align_pieces, judge_poses, refine_poses};
     #[pymodule_export]
-    use crate::registration::{RegistrationSettings, consistent_directions, free_directions, register};
+    use crate::registration::{
+        RegistrationSettings, consistent_directions, free_directions, free_space_share, register,
+    };
     #[pymodule_export]
     use crate::surfaces::{added_sums, find_surfaces, join_surface_pieces, surface_of_sums, surface_sums};
     #[pymodule_export]

@@ -162,6 +162,27 @@ pub fn register<'py>(
     Ok(result)
 }
 
+/// The share of points in the other sensor's free space after a transform; NaN where it is not known.
+#[pyfunction]
+#[pyo3(signature = (source, target, T_target_source, *, radius=None, settings=None, threads=None))]
+#[allow(non_snake_case)]
+pub fn free_space_share(
+    py: Python<'_>,
+    source: ScanArgument<'_>,
+    target: ScanArgument<'_>,
+    T_target_source: [[f64; 4]; 4],
+    radius: Option<f64>,
+    settings: Option<RegistrationSettings>,
+    threads: Option<usize>,
+) -> PyResult<f64> {
+    let (source, target) = (source.scan()?, target.scan()?);
+    let transform =
+        RigidTransform::from_matrix(&T_target_source).map_err(|error| invalid_input(&error.to_string()))?;
+    let settings = settings.map_or_else(surfsig::RegistrationSettings::default, |settings| settings.core);
+    let settings = surfsig::RegistrationSettings { radius, threads, ..settings };
+    watched(py, None, None, |_| surfsig::free_space_share(&source, &target, &transform, &settings))
+}
+
 /// Motions that points with unit normals slide along; see `surfsig.FreeDirection`. Of each its kind, axis and point.
 #[pyfunction]
 pub fn free_directions(

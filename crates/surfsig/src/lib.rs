@@ -117,7 +117,10 @@ pub use recurrences::{
     OrientedScan, PieceAlignment, PieceSituation, PieceView, PosesOfPair, RecurrenceSettings, align_pieces,
     judge_poses, refine_poses,
 };
-pub use registration::{FreeSpaceSettings, REGISTRATION_STEPS, Registration, RegistrationSettings, register};
+pub use registration::{
+    FaceSettings, FreeSpaceSettings, REGISTRATION_STEPS, Registration, RegistrationSettings,
+    free_space_share, register,
+};
 pub use resolution::{COARSEST_STEP, RESOLUTION_SAMPLES, Resolution};
 pub use scan::Scan;
 pub use simd::InstructionSet;

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfsig import geometry
 from surfsig._surfsig import RegistrationSettings
 from surfsig.arguments import progress_callback
 from surfsig.cloud_transforms import transform_cloud
@@ -18,17 +17,11 @@ from surfsig.digits import finite_rows
 from surfsig.errors import InvalidInputError
 from surfsig.files.joined import joined
 from surfsig.point_cloud import PointCloud
-from surfsig.registration.pose_graph import Edge, Solution, solve, spanning_poses
+from surfsig.registration.pair_selection import PairSelection
 from surfsig.registration.registration import Registration
-from surfsig.registration.search import register
+from surfsig.registration.search import free_space_share, register
 
 Array = NDArray[np.float64]
-
-_BY_LOOPS = {"few_matches", "little_overlap", "free_directions"}
-"""Doubts about a pair that a loop of three takes away: they say that little speaks for it, not that anything
-speaks against it."""
-_SAMPLE = 500
-"""Points of a scan that tell by how much two poses differ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +35,8 @@ class RegisteredPair:
     registration: Registration
     """What `register` found."""
     used: bool
-    """Whether the poses of all scans rest on it: it is trusted, or closes a loop of three, and agrees with
-    the others."""
+    """Whether the poses of all scans rest on it: it is trusted, or closes a loop, and agrees with the
+    others."""
     residual: float
     """Root of its squared residual over its covariance, a sixth of it, after all poses were fitted; NaN where
     it was not used."""
@@ -171,9 +164,10 @@ def register_multiway(
     """Find how many scans of one place lie to each other, without a parameter.
 
     All pairs are registered (`register`). Trusted ones join scans to groups; pairs that are not trusted
-    join, too, where three of them close a loop. A pose graph then makes one
-    consistent set of poses of the largest group (robust least squares: SciPy), and pairs that disagree with
-    it are left out.
+    join, too, where they close a loop of at most four groups. A pose graph then makes one consistent set of
+    poses of the largest group (robust least squares: SciPy). Left out are pairs that disagree with it, and
+    those by which one sensor would have looked through what another one saw (Huber and Hebert, Fully
+    automatic registration of multiple 3D data sets, 2003).
 
     Parameters
     ----------
@@ -209,102 +203,20 @@ def register_multiway(
         found.append((source, target, result))
         if report is not None:
             report(len(found), len(numbers))
-    graph = _Graph(scans, found, settings or RegistrationSettings())
-    solution, reference, used = graph.solved()
+    limits = settings or RegistrationSettings()
+
+    def free_space(source: int, target: int, pose: Array) -> float:
+        return free_space_share(
+            scans[source], scans[target], pose, radius=radius, settings=settings, threads=threads
+        )
+
+    # Within that many radii of a patch matches agree with a pose: poses that differ by less are the same.
+    selection = PairSelection(
+        scans, found, limits.consensus_max_distance, free_space, limits.doubted_free_space
+    )
+    solution, reference, used = selection.solved()
     pairs = [
         RegisteredPair(source, target, result, number in used, float(used.get(number, np.nan)))
         for number, (source, target, result) in enumerate(found)
     ]
     return MultiwayRegistration(labels, reference, solution.T_world_scan, solution.covariance, pairs)
-
-
-class _Graph:
-    """Scans and the poses between them."""
-
-    def __init__(
-        self,
-        scans: list[PointCloud],
-        found: list[tuple[int, int, Registration]],
-        settings: RegistrationSettings,
-    ) -> None:
-        # Within that many radii of a patch matches agree with a pose: poses that differ by less are the same.
-        self._agree = settings.consensus_max_distance
-        self.count = len(scans)
-        self.found = found
-        rng = np.random.default_rng(1)
-        self.samples = []
-        for scan in scans:
-            points = scan.points[np.isfinite(scan.points).all(axis=1)].astype(np.float64)
-            chosen = rng.choice(len(points), min(_SAMPLE, len(points)), replace=False)
-            self.samples.append(points[np.sort(chosen)])
-
-    def solved(self) -> tuple[Solution, int, dict[int, float]]:
-        """Give the poses, the reference, and of each pair that was used its residual."""
-        used = {number for number, (*_, result) in enumerate(self.found) if result.trusted}
-        refused: set[int] = set()
-        while True:
-            used |= self._confirmed(used, refused)
-            reference = self._reference(used)
-            numbers = sorted(used)
-            solution = solve(self.count, reference, [self._edge(number) for number in numbers])
-            off = {
-                number: self._disagreement(number, solution.T_world_scan)
-                for number in numbers
-                if np.isfinite(solution.residuals[numbers.index(number)])
-            }
-            worst = max(off, key=lambda number: off[number], default=None)
-            if worst is None or off[worst] <= 1.0:
-                residuals = dict(zip(numbers, solution.residuals.tolist(), strict=True))
-                return solution, reference, {n: r for n, r in residuals.items() if np.isfinite(r)}
-            # One pair at a time: a wrong one pulls at right ones, too.
-            used.discard(worst)
-            refused.add(worst)
-
-    def _edge(self, number: int) -> Edge:
-        source, target, result = self.found[number]
-        return Edge(
-            source, target, result.T_target_source, result.information, result.center, result.explained
-        )
-
-    def _reference(self, used: set[int]) -> int:
-        """Of the largest group the scan that most pairs join; of equal ones the first."""
-        edges = [self._edge(number) for number in sorted(used)]
-        groups = [
-            np.isfinite(spanning_poses(self.count, scan, edges)).all(axis=(1, 2)).sum()
-            for scan in range(self.count)
-        ]
-        pairs = [sum(scan in (edge.source, edge.target) for edge in edges) for scan in range(self.count)]
-        return max(range(self.count), key=lambda scan: (groups[scan], pairs[scan], -scan))
-
-    def _confirmed(self, used: set[int], refused: set[int]) -> set[int]:
-        """Give pairs that are not trusted, but close a loop of three, and that nothing speaks against."""
-        pairs = {}
-        for number, (source, target, result) in enumerate(self.found):
-            if number in used or (number not in refused and _BY_LOOPS.issuperset(result.doubts)):
-                pairs[target, source] = number
-        confirmed = set()
-        for first, second, third in itertools.combinations(range(self.count), 3):
-            corners = ((first, second), (second, third), (first, third))
-            if not all(corner in pairs for corner in corners):
-                continue
-            one, two, both = (self.found[pairs[corner]][2] for corner in corners)
-            chained = one.T_target_source @ two.T_target_source
-            if not np.isfinite(chained @ both.T_target_source).all():
-                continue
-            radius = min(one.radius, two.radius, both.radius)
-            if self._apart(third, chained, both.T_target_source) <= self._agree * radius:
-                confirmed |= {pairs[corner] for corner in corners}
-        return confirmed
-
-    def _disagreement(self, number: int, poses: Array) -> float:
-        """Say by how much a pair disagrees with the poses, 1 where it is left out."""
-        source, target, result = self.found[number]
-        implied = geometry.inverse(poses[target]) @ poses[source]
-        return self._apart(source, implied, result.T_target_source) / (self._agree * result.radius)
-
-    def _apart(self, scan: int, one: Array, other: Array) -> float:
-        """Give the root mean square of the distances between a scan's points after either pose."""
-        off = geometry.transform_points(one, self.samples[scan]) - geometry.transform_points(
-            other, self.samples[scan]
-        )
-        return float(np.sqrt((off**2).sum(axis=1).mean()))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,18 +150,42 @@ def solve(count: int, first: int, edges: Sequence[Edge]) -> Solution:
 
 
 def spanning_poses(count: int, first: int, edges: Sequence[Edge]) -> Array:
-    """Chain poses along the tree of the heaviest edges (Prim); (n, 4, 4), NaN where no edge leads."""
+    """Chain poses along the tree of the heaviest edges; (n, 4, 4), NaN where no edge leads."""
     poses = np.full((count, 4, 4), np.nan)
     poses[first] = np.eye(4)
-    reached = {first}
-    while True:
-        leading = [edge for edge in edges if (edge.source in reached) != (edge.target in reached)]
-        if not leading:
-            return poses
-        edge = max(leading, key=lambda edge: edge.weight)
-        if edge.target in reached:
+    for number, is_forward in _spanning_tree(first, edges):
+        edge = edges[number]
+        if is_forward:
             poses[edge.source] = poses[edge.target] @ edge.T_target_source
-            reached.add(edge.source)
         else:
             poses[edge.target] = poses[edge.source] @ geometry.inverse(edge.T_target_source)
-            reached.add(edge.target)
+    return poses
+
+
+def edges_between(first: int, last: int, edges: Sequence[Edge]) -> list[int]:
+    """Give the numbers of the edges that lead from a scan to another along the tree of the heaviest edges."""
+    leading: dict[int, list[int]] = {first: []}
+    for number, is_forward in _spanning_tree(first, edges):
+        source, target = edges[number].source, edges[number].target
+        begin, end = (target, source) if is_forward else (source, target)
+        leading[end] = [*leading[begin], number]
+    return leading.get(last, [])
+
+
+def _spanning_tree(first: int, edges: Sequence[Edge]) -> Iterator[tuple[int, bool]]:
+    """Give the numbers of the edges of the heaviest tree, each after those that lead to it (Prim).
+
+    With each whether it is gone along from its target to its source.
+    """
+    reached = {first}
+    while True:
+        leading = [
+            number
+            for number, edge in enumerate(edges)
+            if (edge.source in reached) != (edge.target in reached)
+        ]
+        if not leading:
+            return
+        number = max(leading, key=lambda number: edges[number].weight)
+        yield number, edges[number].target in reached
+        reached |= {edges[number].source, edges[number].target}

@@ -111,6 +111,29 @@ def register(
     return result
 
 
+def free_space_share(
+    source: PointCloud,
+    target: PointCloud,
+    T_target_source: NDArray[np.float64],
+    *,
+    radius: float | None,
+    settings: RegistrationSettings | None,
+    threads: int | None,
+) -> float:
+    """Give the larger share of one scan's points in the other sensor's free space, as `Registration` does.
+
+    NaN where no viewpoint is known from which all was seen, or nothing is in sight.
+    """
+    return _surfsig.free_space_share(
+        _scan(source),
+        _scan(target),
+        T_target_source.tolist(),
+        radius=radius,
+        settings=settings,
+        threads=thread_count(threads),
+    )
+
+
 def _scan(cloud: PointCloud) -> _Scan:
     """Give a cloud as the core takes it, with what says on which side the sensor was."""
     viewpoint, directions = orientation(cloud, None, None, np.arange(len(cloud)))

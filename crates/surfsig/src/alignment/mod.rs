@@ -3,7 +3,7 @@
 //! Matches propose a transform ([`consensus`]), distributions refine it ([`gicp`]), points fit it to the surface
 //! ([`point_to_surface`]), many at once are fitted to tangent planes ([`point_to_plane`]), and [`observability`] tells in
 //! which directions nothing determines it, whose variance is infinite ([`open_covariance`]). [`rivals`] are transforms
-//! that explain as much, some of them proposed by [`symmetry`]; [`scale`] tells whether both surfaces are of one size;
+//! that explain as much, some of them proposed by [`symmetry`]; [`faces`] of buildings propose transforms, too; [`scale`] tells whether both surfaces are of one size;
 //! and [`halves`] of an overlap tell what blocks of neighbours cannot see.
 
 mod clustered_covariance;
@@ -11,6 +11,7 @@ mod consensus;
 mod doubt;
 mod even_sample;
 mod explained;
+mod faces;
 mod gicp;
 mod gicp_cloud;
 mod halves;
@@ -29,6 +30,7 @@ pub(crate) use consensus::Correspondences;
 pub use doubt::Doubt;
 pub(crate) use even_sample::even_sample;
 pub(crate) use explained::Closeness;
+pub(crate) use faces::{FaceOffsets, FacedPoints, face_transforms};
 pub(crate) use gicp::gicp_with;
 pub use gicp::{GicpResult, GicpSettings, gicp};
 pub use gicp_cloud::GicpCloud;

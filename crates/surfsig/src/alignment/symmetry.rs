@@ -1,17 +1,12 @@
 //! Rotations that a surface may look the same after: of right angles, of thirds, fifths and sixths about its axes.
 
-use crate::geometry::{RigidTransform, axes_across};
+use super::faces::axes_of_faces;
+use crate::geometry::RigidTransform;
 use crate::kd_tree::KdTree;
 use crate::random::some_of;
 use crate::statistics::quantile;
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
-/// Normals from which axes are taken, at most; the search compares each with all others.
-const NORMALS: usize = 400;
-/// Cosine of the angle between normals of one face, at least (10 degrees).
-const PARALLEL: f64 = 0.985;
-/// Sine of the angle by which a face may be off the right angle to another (10 degrees).
-const ACROSS: f64 = 0.174;
 /// Rotations about an axis: into two, three, four, five and six equal parts.
 const PARTS: [usize; 5] = [2, 3, 4, 5, 6];
 /// Share of the points beyond a bound of the surface, on either side: outliers do not shift its middle.
@@ -62,31 +57,6 @@ pub(crate) fn symmetries(
         rotations(&axes).iter().map(better).filter(|(count, _)| *count as f64 >= least).collect();
     found.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
     found.into_iter().take(MOST).map(|(_, motion)| motion).collect()
-}
-
-/// The normal that most others are parallel to, that of those across it, and the one across both.
-fn axes_of_faces(normals: &[[f64; 3]]) -> Option<Matrix3<f64>> {
-    let some: Vec<Vector3<f64>> =
-        some_of(normals.len(), NORMALS).into_iter().map(|number| normals[number].into()).collect();
-    let first = largest_face(&some)?;
-    let across: Vec<Vector3<f64>> =
-        some.iter().filter(|normal| normal.dot(&first).abs() < ACROSS).copied().collect();
-    let second = largest_face(&across).unwrap_or_else(|| axes_across(&first)[0]);
-    let second = (second - first * first.dot(&second)).try_normalize(0.5)?;
-    Some(Matrix3::from_columns(&[first, second, first.cross(&second)]))
-}
-
-/// The mean of the normals that are parallel to the one to which most are, whichever side they are on.
-fn largest_face(normals: &[Vector3<f64>]) -> Option<Vector3<f64>> {
-    let parallel =
-        |one: &Vector3<f64>| normals.iter().filter(|other| one.dot(other).abs() > PARALLEL).count();
-    let counts: Vec<usize> = normals.iter().map(parallel).collect();
-    // Of equal counts the first.
-    let best =
-        (0..normals.len()).reduce(|best, other| if counts[other] > counts[best] { other } else { best })?;
-    let same_side = |other: &Vector3<f64>| *other * other.dot(&normals[best]).signum();
-    let all = normals.iter().filter(|other| normals[best].dot(other).abs() > PARALLEL).map(same_side);
-    all.sum::<Vector3<f64>>().try_normalize(f64::MIN_POSITIVE)
 }
 
 /// The middle of what points cover along axes.

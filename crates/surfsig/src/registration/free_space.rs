@@ -6,6 +6,7 @@ use crate::scan::CenteredScan;
 use crate::visibility::{RangeImageSettings, SphericalRangeImage, Visibility, all_seen_from};
 
 /// What two sensors saw, as far as is known from where they saw all of their scans, and some points of both.
+#[derive(Clone)]
 pub(super) struct BothSensors<'a> {
     of_source: Option<SensorView>,
     of_target: Option<SensorView>,
@@ -31,6 +32,16 @@ impl<'a> BothSensors<'a> {
         }
     }
 
+    /// The same sensors with other points, of which so many must be in sight.
+    pub fn with_points(&self, source: &'a [[f64; 3]], target: &'a [[f64; 3]], min_points: usize) -> Self {
+        Self { source, target, settings: FreeSpaceSettings { min_points, ..self.settings }, ..self.clone() }
+    }
+
+    /// Where both sensors stood, if it is known of both.
+    pub fn viewpoints(&self) -> Option<[[f64; 3]; 2]> {
+        Some([self.of_source.as_ref()?.viewpoint, self.of_target.as_ref()?.viewpoint])
+    }
+
     /// Whether a point is behind what the target's sensor saw: what lies there it cannot have measured.
     pub fn is_hidden_from_target(&self, point: [f64; 3]) -> bool {
         self.of_target.as_ref().is_some_and(|view| view.is_hidden(point))
@@ -51,6 +62,7 @@ impl<'a> BothSensors<'a> {
 }
 
 /// What a sensor saw that has seen all points of its scan.
+#[derive(Clone)]
 struct SensorView {
     viewpoint: [f64; 3],
     image: SphericalRangeImage,

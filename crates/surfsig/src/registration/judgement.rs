@@ -20,6 +20,24 @@ pub(super) struct Judge<'a> {
     pub settings: &'a RegistrationSettings,
 }
 
+/// What speaks for a transform.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Support {
+    /// The matches that agree; `None` where a start was given.
+    pub inliers: Option<usize>,
+    pub faces: Faces,
+}
+
+/// What the search by faces says of a transform; nothing where there was none.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Faces {
+    /// Whether the transforms that take faces onto faces, as far as both sensors allow them, are among the others that
+    /// were proposed, and explain more than those of the source's mirror image.
+    pub is_searched: bool,
+    /// Whether none of these explains nearly as much, before it is refined.
+    pub is_exclusive: bool,
+}
+
 /// What the tests said of a transform.
 pub(super) struct Judgement {
     pub doubts: Vec<Doubt>,
@@ -34,30 +52,12 @@ pub(super) struct Judgement {
 }
 
 impl Judge<'_> {
-    /// Judges a transform beside others that were proposed; `inliers` are the matches that agree, `None` where a start
-    /// was given.
-    pub fn judged(
-        &self,
-        found: &PointToSurface,
-        proposed: &[RigidTransform],
-        inliers: Option<usize>,
-    ) -> Judgement {
+    /// Judges a transform beside others that were proposed.
+    pub fn judged(&self, found: &PointToSurface, proposed: &[RigidTransform], support: Support) -> Judgement {
         let settings = self.settings;
-        let numbers = some_of(self.sample.len(), settings.rivals.points);
-        let some: Vec<[f64; 3]> = numbers.into_iter().map(|i| self.sample[i]).collect();
+        let some = self.some(self.sample);
         let is_hidden = |point: [f64; 3]| self.sensors.is_hidden_from_target(point);
-        let rivals = Rivals {
-            surface: FittedTarget {
-                surface: self.surface,
-                farthest: found.farthest,
-                fit: settings.rival_fit,
-                is_hidden: &is_hidden,
-            },
-            source: &some,
-            T_target_source: found.T_target_source,
-            radius: self.radius,
-            settings: settings.rivals,
-        };
+        let rivals = self.rivals(found, found.T_target_source, &some, &is_hidden);
         let best = rivals.explained();
         let free_space = self.sensors.free_space(&found.T_target_source);
         let moved = found.T_target_source.transform_points(&some);
@@ -106,21 +106,65 @@ impl Judge<'_> {
             (judged.scale, judged.scale_standard_error) = (scale.scale, scale.standard_error);
         }
         judged.doubts.extend(doubt);
-        self.doubt(found, inliers, &mut judged);
+        self.doubt(found, support, &mut judged);
         judged
     }
 
-    fn doubt(&self, found: &PointToSurface, inliers: Option<usize>, judged: &mut Judgement) {
+    /// The share that a transform explains of other points than the sample, as of its mirror image, after it is fitted to
+    /// them; 0 where it does not bring them to the surface.
+    pub fn explained_of(&self, found: &PointToSurface, points: &[[f64; 3]], start: RigidTransform) -> f64 {
+        let some = self.some(points);
+        let is_hidden = |point: [f64; 3]| self.sensors.is_hidden_from_target(point);
+        let fitted = self.surface.align(&some, start, &self.settings.rival_fit);
+        fitted.map_or(0.0, |fitted| {
+            self.rivals(found, fitted.T_target_source, &some, &is_hidden).explained().share()
+        })
+    }
+
+    /// Those of points that tell transforms apart.
+    fn some(&self, points: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        some_of(points.len(), self.settings.rivals.points).into_iter().map(|i| points[i]).collect()
+    }
+
+    #[allow(non_snake_case)]
+    fn rivals<'b>(
+        &'b self,
+        found: &PointToSurface,
+        T_target_source: RigidTransform,
+        source: &'b [[f64; 3]],
+        is_hidden: &'b (dyn Fn([f64; 3]) -> bool + Sync),
+    ) -> Rivals<'b, FittedTarget<'b>> {
+        let settings = self.settings;
+        let surface = FittedTarget {
+            surface: self.surface,
+            farthest: found.farthest,
+            fit: settings.rival_fit,
+            is_hidden,
+        };
+        Rivals { surface, source, T_target_source, radius: self.radius, settings: settings.rivals }
+    }
+
+    fn doubt(&self, found: &PointToSurface, support: Support, judged: &mut Judgement) {
         let settings = self.settings;
         let doubts = &mut judged.doubts;
-        let is_certain = judged.free_space <= settings.free_space.certain_share
-            && judged.explained >= settings.certain_explained;
-        let needed = if is_certain { settings.certain_inliers } else { settings.trusted_inliers };
-        if let Some(inliers) = inliers.filter(|&inliers| inliers < needed) {
+        // NaN is no free space that is known.
+        let is_freer_than = |share: f64| judged.free_space <= share;
+        let explains_much = judged.explained >= settings.certain_explained;
+        let is_proved_by_faces = support.faces.is_exclusive
+            && is_freer_than(settings.free_space.doubted_share)
+            || support.faces.is_searched && explains_much && is_freer_than(settings.faces.certain_free_space);
+        let needed = if is_proved_by_faces {
+            0
+        } else if explains_much && is_freer_than(settings.free_space.certain_share) {
+            settings.certain_inliers
+        } else {
+            settings.trusted_inliers
+        };
+        if let Some(inliers) = support.inliers.filter(|&inliers| inliers < needed) {
             doubts.push(Doubt::FewMatches { inliers, needed });
         }
         let overlap = found.overlap;
-        let least = match inliers {
+        let least = match support.inliers {
             None => settings.trusted_overlap_of_start,
             Some(_) => settings.trusted_overlap,
         };

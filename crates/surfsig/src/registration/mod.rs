@@ -2,22 +2,27 @@
 //!
 //! Keypoints are matched by their field signatures ([`crate::match_fields`]), the matches agree on a transform
 //! ([`crate::ConsensusSettings`]), generalised ICP refines it ([`crate::gicp`]), the last steps fit points to the
-//! surface and tell how sure it is, and then it is tried to refute the result ([`Doubt`]).
+//! surface and tell how sure it is, and then it is tried to refute the result ([`Doubt`]). Where matches prove nothing,
+//! faces of buildings propose transforms ([`FaceSettings`]), of which free space chooses.
 
+mod face_search;
 mod free_space;
 mod judgement;
 mod result;
 mod settings;
+mod trial;
 
 pub use result::Registration;
-pub use settings::{FreeSpaceSettings, RegistrationSettings};
+pub use settings::{FaceSettings, FreeSpaceSettings, RegistrationSettings};
 
+use face_search::Faced;
 use free_space::BothSensors;
 use judgement::{Judge, Judgement};
+use trial::{Trial, Tried};
 
 use crate::alignment::{
-    Alternative, Correspondences, Doubt, GicpCloud, GicpSettings, PointToSurface, TargetSurface, even_sample,
-    gicp, infinite_along, information_without,
+    Alternative, Correspondences, Doubt, GicpCloud, TargetSurface, even_sample, infinite_along,
+    information_without,
 };
 use crate::field::{KeypointOptions, keypoints_within, match_fields};
 use crate::geometry::RigidTransform;
@@ -28,6 +33,9 @@ use crate::{Error, FieldOptions, FieldPlaces, Monitor, PointCloud, Radius, Scan,
 
 /// Steps of which [`Monitor::done`] counts each.
 pub const REGISTRATION_STEPS: usize = 5;
+
+/// Matches without which they propose no transform: three places determine one.
+const MIN_MATCHES: usize = 3;
 
 /// Finds how a source lies in a target, from any start; or refines `start` (T_target_source) where one is given.
 ///
@@ -97,59 +105,52 @@ fn registered(
             let thinned =
                 [source, target].map(|scan| scan.thinned(radius / settings.description_voxels_per_radius));
             let matches = matched(&thinned[0], &thinned[1], patch, settings, monitor)?;
-            if matches.len() < 3 {
-                return Ok(Registration::nothing(radius, matches.len()));
-            }
             let rivals = settings.rivals;
             let distance = rivals.distance * radius;
-            let proposals = matches.agreed_transforms(rivals.proposals, rivals.least_score, distance);
+            let proposals = if matches.len() < MIN_MATCHES {
+                Vec::new()
+            } else {
+                matches.agreed_transforms(rivals.proposals, rivals.least_score, distance)
+            };
             (proposals, Some(matches))
         }
     };
     let count = matches.as_ref().map_or(0, Correspondences::len);
     monitor.check()?;
     let voxel = radius / settings.voxels_per_radius;
-    let [ours, theirs] = [source, target].map(|scan| voxel_means(&scan.points, voxel));
-    if ours.len().min(theirs.len()) < settings.min_voxels {
+    let clouds = [source, target].map(|scan| GicpCloud::new(voxel_means(&scan.points, voxel)));
+    let [ours, theirs] = [0, 1].map(|side: usize| clouds[side].len());
+    if ours.min(theirs) < settings.min_voxels {
         return Ok(Registration::nothing(radius, count));
     }
-    let sample = even_sample(&source.points, ours.len().min(settings.max_points), voxel);
-    let surface = TargetSurface::new(even_sample(&target.points, theirs.len(), voxel), voxel);
+    let sample = even_sample(&source.points, ours.min(settings.max_points), voxel);
+    let surface = TargetSurface::new(even_sample(&target.points, theirs, voxel), voxel);
     monitor.add(1);
-    monitor.check()?;
-    let refined = refined(ours, theirs, proposals[0], voxel, settings);
-    monitor.add(1);
-    monitor.check()?;
-    let Some(mut found) = surface.align(&sample, refined, &settings.point_to_surface) else {
+    let sensors = BothSensors::new([source, target], [&sample, surface.points()], voxel, settings.free_space);
+    let sides = sensors
+        .viewpoints()
+        .map(|viewpoints| [0, 1].map(|k| Faced::new(&clouds[k], viewpoints[k], &settings.faces)));
+    let trial = Trial {
+        judge: Judge { surface: &surface, sample: &sample, sensors, radius, settings },
+        clouds: &clouds,
+        sides,
+        voxel,
+        matches: matches.as_ref(),
+        monitor,
+    };
+    let Some(Tried { found, mut judged, support }) = trial.best(&proposals)? else {
         return Ok(Registration::nothing(radius, count));
     };
-    monitor.check()?;
-    let judge = Judge {
-        surface: &surface,
-        sample: &sample,
-        sensors: BothSensors::new([source, target], [&sample, surface.points()], voxel, settings.free_space),
-        radius,
-        settings,
-    };
-    let inliers_of =
-        |found: &PointToSurface| matches.as_ref().map(|matches| matches.inlier_count(&found.T_target_source));
-    let mut inliers = inliers_of(&found);
-    let mut judged = judge.judged(&found, &proposals[1..], inliers);
-    if let Some(better) =
-        judged.better.and_then(|better| surface.align(&sample, better, &settings.point_to_surface))
-    {
-        let others: Vec<RigidTransform> =
-            proposals[1..].iter().copied().chain([found.T_target_source]).collect();
-        inliers = inliers_of(&better);
-        judged = judge.judged(&better, &others, inliers);
-        found = better;
-    }
-    if let (true, Some(own)) = (judged.doubts.is_empty(), inliers) {
+    monitor.add(1);
+    if let (true, false, Some(own)) = (judged.doubts.is_empty(), support.faces.is_searched, support.inliers) {
         let agreement = own as f64 / (count as f64 * found.overlap);
         if agreement < settings.doubted_agreement {
-            let mirrored = mirrored_inliers(source, target, patch, settings, monitor)?;
-            if mirrored as f64 > settings.mirrored_inliers * own as f64 {
-                judged.doubts.push(Doubt::Mirrored { inliers: mirrored });
+            let (inliers, start) = mirrored(source, target, patch, settings, monitor)?;
+            let image: Vec<[f64; 3]> = sample.iter().map(|&[x, y, z]| [-x, y, z]).collect();
+            if inliers as f64 > settings.mirrored_inliers * own as f64
+                && trial.judge.explained_of(&found, &image, start) > judged.explained
+            {
+                judged.doubts.push(Doubt::Mirrored { inliers });
             }
         }
     }
@@ -170,7 +171,7 @@ fn registered(
         free_directions: free_directions.iter().map(|direction| direction.transformed(&to_target)).collect(),
         alternatives: alternatives.collect(),
         matches: count,
-        inliers: inliers.unwrap_or(0),
+        inliers: support.inliers.unwrap_or(0),
         overlap: found.overlap,
         explained: judged.explained,
         free_space: judged.free_space,
@@ -181,18 +182,63 @@ fn registered(
     })
 }
 
-/// How many matches of the source's mirror image agree with one transform.
-fn mirrored_inliers(
+/// The larger share of one scan's points that lie in the other sensor's free space after a transform, of those that it
+/// would have measured; NaN where no viewpoint is known from which all was seen, or nothing is in sight.
+///
+/// # Errors
+/// [`Error::Threads`]; [`Error::InvalidRadius`] for a radius that is none.
+///
+/// ```
+/// use surfsig::{free_space_share, PointCloud, RegistrationSettings, RigidTransform, Scan};
+/// let wall = |x: f64| -> Vec<[f64; 3]> {
+///     (0..3600).map(|i| [x, f64::from(i % 60) * 0.05 - 1.5, f64::from(i / 60) * 0.05 - 1.5]).collect()
+/// };
+/// let (near, far) = (wall(2.0), wall(4.0));
+/// let [near, far] = [&near, &far].map(|wall| Scan::new(PointCloud::new_f64(wall)).seen_from([0.0; 3]));
+/// let share = |source, target| {
+///     free_space_share(source, target, &RigidTransform::identity(), &RegistrationSettings::default())
+/// };
+/// assert_eq!(share(&far, &far)?, 0.0);
+/// assert!(share(&near, &far)? > 0.9, "the far wall was seen through the near one");
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+#[allow(non_snake_case)]
+pub fn free_space_share(
+    source: &Scan<'_>,
+    target: &Scan<'_>,
+    T_target_source: &RigidTransform,
+    settings: &RegistrationSettings,
+) -> Result<f64, Error> {
+    settings.radius.map(Radius::new).transpose()?;
+    with_threads(settings.threads, || {
+        let scans = [CenteredScan::new(source), CenteredScan::new(target)];
+        let size = scans[0].size().min(scans[1].size());
+        let voxel = settings.radius.unwrap_or(settings.radius_share * size) / settings.voxels_per_radius;
+        if !(voxel > 0.0) {
+            return f64::NAN;
+        }
+        let samples = [0, 1].map(|k| even_sample(&scans[k].points, settings.max_points, voxel));
+        let sensors =
+            BothSensors::new([&scans[0], &scans[1]], [&samples[0], &samples[1]], voxel, settings.free_space);
+        let [from_source, to_target] =
+            [0, 1].map(|k| RigidTransform::from_rotation_vector([0.0; 3], scans[k].center));
+        sensors.free_space(&(to_target.inverse() * *T_target_source * from_source))
+    })
+}
+
+/// How many matches of the source's mirror image agree with one transform, and this.
+fn mirrored(
     source: &CenteredScan,
     target: &CenteredScan,
     patch: Radius,
     settings: &RegistrationSettings,
     monitor: &Monitor,
-) -> Result<usize, Error> {
+) -> Result<(usize, RigidTransform), Error> {
     let thinned = |scan: &CenteredScan| scan.thinned(patch.get() / settings.description_voxels_per_radius);
     let mirrored = thinned(source).mirrored();
     let matches = matched(&mirrored, &thinned(target), patch, settings, &monitor.apart())?;
-    Ok(matches.inlier_count(&matches.agreed_transform()))
+    let agreed = matches.agreed_transform();
+    Ok((matches.inlier_count(&agreed), agreed))
 }
 
 /// Matches keypoints; where it is not known for both scans from where they were seen, both sides of the source's
@@ -247,31 +293,4 @@ fn described(
         None => FieldOptions { viewpoint: own.viewpoint, directions: own.directions, ..Default::default() },
     };
     keypoints_within(&PointCloud::new_f64(&scan.points), radius, &keypoints, &options, &monitor.apart())
-}
-
-/// By generalised ICP, in voxels; a transform without correspondences stays as it was proposed.
-fn refined(
-    source: Vec<[f64; 3]>,
-    target: Vec<[f64; 3]>,
-    proposed: RigidTransform,
-    voxel: f64,
-    settings: &RegistrationSettings,
-) -> RigidTransform {
-    let [source, target] = [source, target].map(GicpCloud::new);
-    let mut transform = proposed;
-    for distance in settings.gicp_distances {
-        let [rotation_epsilon, translation] = settings.gicp_epsilon;
-        let round = GicpSettings {
-            max_correspondence_distance: distance * voxel,
-            max_iterations: settings.gicp_iterations,
-            rotation_epsilon,
-            translation_epsilon: translation * voxel,
-        };
-        let found = gicp(&target, &source, transform, &round);
-        if found.inliers == 0 {
-            return proposed;
-        }
-        transform = found.T_target_source;
-    }
-    transform
 }
