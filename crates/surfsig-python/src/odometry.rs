@@ -110,11 +110,14 @@ impl Odometry {
         let poses: Vec<f64> = found.iter().flat_map(matrix).flatten().collect();
         let covariances: Vec<f64> = found.iter().flat_map(|pose| pose.covariance).flatten().collect();
         let status: Vec<u8> = found.iter().map(|pose| pose.status as u8).collect();
+        let segments: Vec<i64> =
+            found.iter().map(|pose| if pose.T_map_scan.is_some() { pose.segment as i64 } else { -1 }).collect();
         let overlaps: Vec<f64> = found.iter().map(|pose| pose.overlap).collect();
         let arrays = PyDict::new(py);
         arrays.set_item("poses", poses.into_pyarray(py).reshape([found.len(), 4, 4])?)?;
         arrays.set_item("covariances", covariances.into_pyarray(py).reshape([found.len(), 6, 6])?)?;
         arrays.set_item("status", status.into_pyarray(py))?;
+        arrays.set_item("segments", segments.into_pyarray(py))?;
         arrays.set_item("overlaps", overlaps.into_pyarray(py))?;
         let free: Vec<_> =
             found.iter().map(|pose| free_directions_to_python(&pose.free_directions)).collect();

@@ -102,7 +102,7 @@ pub use monitor::Monitor;
 pub use neighbor_distances::mean_neighbor_distances;
 pub use odometry::{
     ExpectationSettings, MapSettings, Odometry, OdometrySettings, PredictionSettings, RelocalisationSettings,
-    ScaleSettings, ScanAlignmentSettings, ScanPose, ScanStatus,
+    ScaleSettings, ScanAlignmentSettings, ScanPose, ScanStatus, SegmentSettings,
 };
 pub use orientation::consistent_directions;
 pub use point_cloud::{Offsets, PointCloud, Radius};

@@ -47,6 +47,9 @@ class Odometry:
     as that variance grows."""
     status: NDArray[np.uint8]
     """`ScanStatus` as a number, (n,)."""
+    segments: NDArray[np.int64]
+    """Number of the world that each pose is given in, (n,): where a sensor stays lost, another map is begun, whose
+    first scan is its world; -1 where there is no pose."""
     overlaps: Array
     """Share of the scan's points that lie on the map, (n,); 0 where there is no pose."""
     free_directions: list[list[FreeDirection]]

@@ -5,11 +5,15 @@ use super::settings::ExpectationSettings;
 use crate::statistics::median;
 use std::collections::VecDeque;
 
+/// Points that contradict nothing, however few there are.
+const FEW: f64 = 3.0;
+
 /// What the last scans with a pose did; all shares depend on the sensor and its surroundings.
 #[derive(Debug, Clone)]
 pub(super) struct Expectation {
     settings: ExpectationSettings,
     overlaps: VecDeque<f64>,
+    known: VecDeque<f64>,
     free_space: VecDeque<f64>,
     unexplained: VecDeque<f64>,
 }
@@ -17,15 +21,14 @@ pub(super) struct Expectation {
 impl Expectation {
     pub fn new(settings: &ExpectationSettings) -> Self {
         let none = VecDeque::new;
-        Self { settings: settings.clone(), overlaps: none(), free_space: none(), unexplained: none() }
+        Self { settings: settings.clone(), overlaps: none(), known: none(), free_space: none(), unexplained: none() }
     }
 
     /// Takes a scan that has a pose.
     pub fn add(&mut self, found: &ScanAlignment) {
-        let values = [found.overlap, found.free_space, found.unexplained];
-        for (last, value) in
-            [&mut self.overlaps, &mut self.free_space, &mut self.unexplained].into_iter().zip(values)
-        {
+        let values = [found.overlap, found.known, found.free_space, found.unexplained];
+        let lasts = [&mut self.overlaps, &mut self.known, &mut self.free_space, &mut self.unexplained];
+        for (last, value) in lasts.into_iter().zip(values) {
             last.push_back(value);
             if last.len() > self.settings.scans {
                 last.pop_front();
@@ -35,13 +38,16 @@ impl Expectation {
 
     /// Whether the scan lies on the map as scans do and contradicts nothing.
     pub fn is_met(&self, found: &ScanAlignment) -> bool {
-        let enough = found.overlap >= self.settings.doubted_overlap * self.overlap();
-        enough && !self.is_contradicted(found)
+        // Of a scan that sees what none has seen, less lies on the map.
+        let expected = self.overlap() * (found.known / self.known()).min(1.0);
+        found.overlap >= self.settings.doubted_overlap * expected && !self.is_contradicted(found)
     }
 
     /// Whether scan and map cannot both be, by what either sensor would have measured.
     pub fn is_contradicted(&self, found: &ScanAlignment) -> bool {
-        found.unexplained > self.largest_unexplained() + self.settings.unexplained_excess
+        // A few points may be anything, and of few points they are a large share.
+        let few = FEW / (found.known * found.count as f64).max(1.0);
+        found.unexplained > self.largest_unexplained() + self.settings.unexplained_excess + few
             || found.free_space > self.free_space() + self.settings.free_space_excess
     }
 
@@ -59,8 +65,19 @@ impl Expectation {
         departed && arrived
     }
 
+    /// Whether enough of the scan lies on the map, and determines its pose, where a point at a range counts.
+    pub fn is_believable(&self, found: &ScanAlignment, range: f64) -> bool {
+        let least = self.settings.least_overlap.max(self.settings.min_overlap * found.known);
+        found.overlap >= least && found.deviation(range) <= self.settings.max_deviation
+    }
+
     fn overlap(&self) -> f64 {
         median(self.overlaps.iter().copied().collect()).unwrap_or(self.settings.first_overlap)
+    }
+
+    /// Before any scan is known, all of one may be.
+    fn known(&self) -> f64 {
+        median(self.known.iter().copied().collect()).unwrap_or(1.0).max(f64::MIN_POSITIVE)
     }
 
     fn free_space(&self) -> f64 {
@@ -83,8 +100,10 @@ mod tests {
         ScanAlignment {
             T_map_scan: RigidTransform::identity(),
             covariance: Matrix6::identity(),
+            count: 4000,
             overlap,
             free_space,
+            known: 1.0,
             unexplained,
             systematic: Matrix6::zeros(),
             free_directions: Vec::new(),

@@ -31,11 +31,13 @@ pub(super) struct Keyframes {
     median_range: f64,
     patch_radius: f64,
     kept: Vec<Keyframe>,
+    /// The keyframe that the next search goes on from.
+    next: usize,
 }
 
 impl Keyframes {
     pub fn new(settings: &OdometrySettings, median_range: f64, patch_radius: f64) -> Self {
-        Self { settings: settings.clone(), median_range, patch_radius, kept: Vec::new() }
+        Self { settings: settings.clone(), median_range, patch_radius, kept: Vec::new(), next: 0 }
     }
 
     /// Keeps a scan, unless there is one of nearly the same pose.
@@ -75,16 +77,23 @@ impl Keyframes {
         }
     }
 
+    /// Takes out those of scans whose poses were wrong.
+    pub fn remove(&mut self, numbers: &[usize]) {
+        self.kept.retain(|keyframe| !numbers.contains(&(keyframe.number as usize)));
+    }
+
     /// Of the poses that matches propose, the one that lies best on the map of the keyframes around it, and that map.
+    /// `last` is where the sensor was.
     pub fn find(
         &mut self,
         scan: &ThinnedScan,
+        last: &RigidTransform,
         map_range: f64,
         is_believed: impl Fn(&ScanAlignment) -> bool,
     ) -> Option<(ScanAlignment, LocalMap)> {
         let mut best: Option<(ScanAlignment, LocalMap)> = None;
         let distance = self.settings.relocalisation.max_correspondence_distance;
-        for pose in self.proposals(scan) {
+        for pose in self.proposals(scan, last) {
             let map = self.submap(pose.translation.into(), map_range);
             let known = |pose: &RigidTransform| self.would_have_seen(pose);
             let Some(found) = align(scan, &map, pose, distance, &self.settings.alignment, known) else {
@@ -98,14 +107,35 @@ impl Keyframes {
         best
     }
 
+    /// The keyframes that are searched now: half of them the nearest to where the sensor was, the others in turn.
+    fn searched(&mut self, last: &RigidTransform) -> Vec<usize> {
+        let most = self.settings.relocalisation.max_keyframes.min(self.kept.len());
+        let distance = |number: &usize| (self.kept[*number].T_map_scan.translation - last.translation).norm();
+        let mut chosen: Vec<usize> = (0..self.kept.len()).collect();
+        chosen.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        chosen.truncate(most.div_ceil(2));
+        while chosen.len() < most {
+            self.next = self.next.checked_sub(1).unwrap_or(self.kept.len() - 1).min(self.kept.len() - 1);
+            if !chosen.contains(&self.next) {
+                chosen.push(self.next);
+            }
+        }
+        chosen
+    }
+
     /// Poses of a scan that enough matches with a keyframe agree with, those of most matches first.
-    fn proposals(&mut self, scan: &ThinnedScan) -> Vec<RigidTransform> {
+    fn proposals(&mut self, scan: &ThinnedScan, last: &RigidTransform) -> Vec<RigidTransform> {
+        let searched = self.searched(last);
+        if searched.is_empty() {
+            return Vec::new();
+        }
         let radius = self.patch_radius;
         let settings = &self.settings.relocalisation;
         let consensus = ConsensusSettings::default();
         let ours = described(&in_float32(&scan.means(settings.detail_voxel)), radius);
         let mut proposals: Vec<(usize, RigidTransform)> = Vec::new();
-        for keyframe in self.kept.iter_mut().rev().take(settings.max_keyframes) {
+        for number in searched {
+            let keyframe = &mut self.kept[number];
             let theirs = keyframe.described.get_or_insert_with(|| described(&keyframe.detail, radius));
             let matches = Correspondences::new(&match_fields(&ours, theirs, true), &ours, theirs, consensus);
             let transform = matches.agreed_transform();

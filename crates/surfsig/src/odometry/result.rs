@@ -37,7 +37,7 @@ impl ScanStatus {
     }
 }
 
-/// A scan's pose in the map, whose frame is that of the first scan that has one.
+/// A scan's pose in the map of its segment, whose frame is that of the segment's first scan.
 ///
 /// ```
 /// use surfsig::{Odometry, OdometrySettings, PointCloud, Scan, ScanStatus};
@@ -53,6 +53,9 @@ impl ScanStatus {
 pub struct ScanPose {
     /// The scan's number, from 0.
     pub scan: usize,
+    /// Number of the map that the pose is in, from 0: where a sensor stays lost, another map is begun, whose frame is
+    /// that of its first scan. Poses in different segments have no known relation.
+    pub segment: usize,
     /// Takes the scan's points to the map; `None` where the scan has no pose.
     pub T_map_scan: Option<RigidTransform>,
     /// Of the twist m (rotation vector in radians, then translation) in the scan's own axes by which the pose is off:
@@ -74,6 +77,7 @@ impl ScanPose {
     pub(super) fn none(scan: usize, status: ScanStatus) -> Self {
         Self {
             scan,
+            segment: 0,
             T_map_scan: None,
             covariance: [[f64::NAN; 6]; 6],
             free_directions: Vec::new(),

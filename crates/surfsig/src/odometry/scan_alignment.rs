@@ -30,16 +30,30 @@ pub(super) struct ScanAlignment {
     pub covariance: Matrix6<f64>,
     /// What errs alike over large parts of the scan, likewise.
     pub systematic: Matrix6<f64>,
-    /// Share of the scan's points that lie on the map's surface.
+    /// Points of the scan.
+    pub count: usize,
+    /// Share of them that lie on the map's surface.
     pub overlap: f64,
     /// Share of the map's points in free space, of those that the sensor would have measured.
     pub free_space: f64,
+    /// Share of the scan's points that earlier scans would have measured.
+    pub known: f64,
     /// Share of the scan's points that the map lacks, of those that earlier scans would have measured.
     pub unexplained: f64,
     /// Motions that the map does not determine, in the scan's coordinates.
     pub free_directions: Vec<FreeDirection>,
     /// The scans that the map's points on which it lies came from, each with its share of them.
     pub scans: Vec<(u32, f64)>,
+}
+
+impl ScanAlignment {
+    /// Standard deviation of the pose along the motions that the map determines: the distance by which it may carry
+    /// a point at a range, in voxels.
+    pub fn deviation(&self, range: f64) -> f64 {
+        let both = self.covariance + self.systematic;
+        let trace = |first: usize| (first..first + 3).map(|k| both[(k, k)]).sum::<f64>();
+        (trace(0) * range * range + trace(3)).sqrt()
+    }
 }
 
 /// Aligns a scan from a pose nearby; `None` where it hardly meets the map. Along motions that the map does not determine
@@ -108,8 +122,10 @@ pub(super) fn align<F: Fn([f64; 3]) -> bool>(
         T_map_scan: pose,
         covariance,
         systematic,
+        count: scan.points.len(),
         overlap: plane.on_map as f64 / scan.points.len() as f64,
         free_space: scan.range_image.free_space_share(samples),
+        known: known as f64 / scan.points.len() as f64,
         unexplained: lacking as f64 / known.max(1) as f64,
         free_directions,
         scans: plane.shares_of_scans(map),

@@ -42,6 +42,8 @@ pub struct OdometrySettings {
     pub prediction: PredictionSettings,
     /// When a pose is doubted, and when it is believed.
     pub expectation: ExpectationSettings,
+    /// When another map is begun.
+    pub segments: SegmentSettings,
     /// How a sensor that was lost is found again.
     pub relocalisation: RelocalisationSettings,
     /// What a scan looked through; lengths in voxels.
@@ -83,6 +85,13 @@ pub struct ScaleSettings {
     /// Median distances of the first scan's points from their median beyond which a sensor is not believed to be at
     /// the viewpoint: the scan is then in coordinates of a map, and its median stands for the sensor.
     pub farthest_viewpoint: f64,
+}
+
+impl ScaleSettings {
+    /// Voxels that a scan of so many points should fill.
+    pub(super) fn wanted(&self, points: usize) -> f64 {
+        self.voxels_of_scan.min(self.largest_filled_share * points as f64)
+    }
 }
 
 impl Default for ScaleSettings {
@@ -178,6 +187,9 @@ pub struct MapSettings {
     /// Range of the map over the distance within which 99 in 100 points of a scan are: what the next scans see must be
     /// in it.
     pub range_factor: f64,
+    /// Scans in a row that look through a point of the map after which it is taken out, as what has moved on: one
+    /// alone may have a wrong pixel or pose.
+    pub scans_through: u8,
 }
 
 impl Default for MapSettings {
@@ -188,6 +200,7 @@ impl Default for MapSettings {
             min_translation: 1.0,
             min_rotation: 0.03,
             range_factor: 1.2,
+            scans_through: 2,
         }
     }
 }
@@ -228,14 +241,20 @@ impl Default for PredictionSettings {
 pub struct ExpectationSettings {
     /// Scans that the expectation is taken from.
     pub scans: usize,
-    /// Share of the expected overlap (their median) below which a pose is doubted.
+    /// Share of the expected overlap (their median, less what no earlier scan would have measured) below which a pose is
+    /// doubted.
     pub doubted_overlap: f64,
     /// Share of the expected overlap from which on a pose that was searched may be believed at once.
     pub certain_overlap: f64,
     /// Expected overlap before any scan has a pose.
     pub first_overlap: f64,
-    /// Overlap of a pose that is believed, at least.
+    /// Overlap of a pose that is believed, at least, as a share of the points that earlier scans would have measured:
+    /// where sight opens, most of a scan is new.
     pub min_overlap: f64,
+    /// Share of all points that must lie on the map, at least.
+    pub least_overlap: f64,
+    /// Standard deviation of a pose that is believed, at most: in voxels, at the median range.
+    pub max_deviation: f64,
     /// Share of the map's points in sight that are in free space, above the expected share (the median), from which on
     /// scan and map contradict each other.
     pub free_space_excess: f64,
@@ -258,12 +277,39 @@ impl Default for ExpectationSettings {
             certain_overlap: 0.93,
             first_overlap: 0.4,
             min_overlap: 0.4,
+            least_overlap: 0.1,
+            max_deviation: 0.5,
             free_space_excess: 0.01,
             unexplained_excess: 0.015,
             certain_unexplained: 0.02,
             departed_excess: 0.05,
             arrived_excess: 0.2,
         }
+    }
+}
+
+/// When another map is begun: where a sensor stays lost, or the lengths that were taken from the first scan do not fit
+/// those that follow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SegmentSettings {
+    /// Scans that follow each other through a map of their own, while they are lost in the present one, after which it
+    /// takes the present one's place: so many may be lost by something that is over soon.
+    pub scans_lost: usize,
+    /// The same, where the present lengths do not fit.
+    pub scans_unfit: usize,
+    /// Share of the voxels that a scan should fill, below which voxels are too large for it.
+    pub least_filled: f64,
+    /// Voxels that a scan fills, in those that one should, above which they are too small, and take too much time.
+    pub most_filled: f64,
+    /// Factor between the present voxels and those that a scan would have, below which another map is not worth it.
+    pub least_ratio: f64,
+    /// Past maps that are kept, to find the sensor again.
+    pub max_kept: usize,
+}
+
+impl Default for SegmentSettings {
+    fn default() -> Self {
+        Self { scans_lost: 5, scans_unfit: 3, least_filled: 0.25, most_filled: 3.0, least_ratio: 1.5, max_kept: 8 }
     }
 }
 
@@ -274,8 +320,20 @@ pub struct RelocalisationSettings {
     pub keyframe_distance: f64,
     /// Rotation between keyframes nearer than that, in radians.
     pub keyframe_rotation: f64,
-    /// Keyframes that are searched, at most, the latest first.
+    /// Keyframes that are searched for one scan, at most: the nearest to where the sensor was last, and as many others
+    /// in turn, so that a search costs a few tracked scans.
     pub max_keyframes: usize,
+    /// Scans after a search before a pose is searched again that would be kept without.
+    pub scans_between: usize,
+    /// Step between the rotations about the sensor's axes that are tried at its last position, in radians: a point at
+    /// the median range of some 30 voxels moves by two in half a step.
+    pub rotation_step: f64,
+    /// Points of the scan by which such rotations are compared.
+    pub rotation_points: usize,
+    /// Distance to the map, in voxels, within which such a point counts.
+    pub rotation_distance: f64,
+    /// Such rotations from which the scan is aligned, at most, the best first.
+    pub rotation_trials: usize,
     /// Matches that agree with a pose that is tried, at least.
     pub min_matches: usize,
     /// Poses that are tried on the keyframes' map, at most, those first that most matches agree with.
@@ -302,7 +360,12 @@ impl Default for RelocalisationSettings {
         Self {
             keyframe_distance: 0.3,
             keyframe_rotation: 30.0_f64.to_radians(),
-            max_keyframes: 50,
+            max_keyframes: 16,
+            scans_between: 10,
+            rotation_step: 8.0_f64.to_radians(),
+            rotation_points: 300,
+            rotation_distance: 1.5,
+            rotation_trials: 2,
             min_matches: 24,
             max_trials: 3,
             detail_voxel: 0.5,

@@ -14,7 +14,7 @@ const FARTHEST: f64 = 1e150;
 /// The points of a scan about its sensor; lengths are in voxels.
 pub(super) struct ThinnedScan {
     /// All of them.
-    measured: Vec<[f64; 3]>,
+    pub measured: Vec<[f64; 3]>,
     /// The mean of each voxel's points.
     pub points: Vec<[f64; 3]>,
     /// What GICP takes: the means of coarser voxels.

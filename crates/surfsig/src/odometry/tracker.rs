@@ -1,9 +1,14 @@
-//! Scan after scan: predicted, aligned with the map, and searched among keyframes where that fails.
+//! Scan after scan: predicted, aligned with the map, and searched where that fails: by other motions, by rotations, and
+//! among keyframes.
+
+mod relocalisation;
 
 use super::expectation::Expectation;
 use super::keyframes::Keyframes;
 use super::local_map::LocalMap;
+use super::pose_covariance::{Covariance, sum_of_alike};
 use super::result::ScanStatus;
+use super::rotation_search::rotations_on_map;
 use super::scale::{Scale, distances};
 use super::scan_alignment::{ScanAlignment, align};
 use super::settings::OdometrySettings;
@@ -11,7 +16,7 @@ use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
 use crate::alignment::{FreeDirection, orthonormal, unscaled};
 use crate::statistics::quantile;
-use nalgebra::{Matrix6, Vector3};
+use nalgebra::Vector3;
 
 /// Share of a scan's points that the map's range is taken from.
 const MOST: f64 = 0.99;
@@ -31,36 +36,6 @@ pub(super) struct Step {
     pub free_directions: Vec<FreeDirection>,
     pub status: ScanStatus,
     pub overlap: f64,
-}
-
-/// What a pose may be off by.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Covariance {
-    /// By chance, in each scan anew.
-    pub random: Matrix6<f64>,
-    /// Alike in all scans.
-    pub systematic: Matrix6<f64>,
-    /// Along motions that nothing determines, in the unknown variance of such a motion: they stay apart from the
-    /// others, so that the small angles between those of several scans do not count.
-    pub open: Matrix6<f64>,
-}
-
-impl Covariance {
-    fn zeros() -> Self {
-        Self { random: Matrix6::zeros(), systematic: Matrix6::zeros(), open: Matrix6::zeros() }
-    }
-
-    /// In other axes.
-    fn carried(&self, transform: &RigidTransform) -> Self {
-        let adjoint = transform.adjoint();
-        let adjoint = Matrix6::from_fn(|row, column| adjoint[row][column]);
-        let carried = |covariance: &Matrix6<f64>| adjoint * covariance * adjoint.transpose();
-        Self {
-            random: carried(&self.random),
-            systematic: carried(&self.systematic),
-            open: carried(&self.open),
-        }
-    }
 }
 
 /// Keeps the map, the motion and the keyframes; lengths are in voxels.
@@ -88,7 +63,15 @@ pub(super) struct Tracker {
     is_lost: bool,
     /// Scans whose poses the next ones have to confirm.
     trial: Vec<Step>,
+    /// Whether the first of them is where the sensor was expected, and has only rotated.
+    trial_is_there: bool,
     last_mapped: Option<RigidTransform>,
+    /// Scans since the last search.
+    since_search: usize,
+    /// Numbers of the scans up to the last one whose poses were kept though doubted.
+    doubted: Vec<usize>,
+    /// Numbers of the scans whose poses a later one has disproved, until they are asked for.
+    disproved: Vec<usize>,
     number: usize,
 }
 
@@ -113,15 +96,65 @@ impl Tracker {
             expectation: Expectation::new(&settings.expectation),
             is_lost: false,
             trial: Vec::new(),
+            trial_is_there: false,
             last_mapped: None,
+            since_search: usize::MAX,
+            doubted: Vec::new(),
+            disproved: Vec::new(),
             number: 0,
         }
+    }
+
+    /// Whether poses of the last scans wait for the next ones.
+    pub fn is_on_trial(&self) -> bool {
+        !self.trial.is_empty()
+    }
+
+    /// Ends tracking: only a search finds the sensor again.
+    pub fn leave(&mut self) {
+        self.trial.clear();
+        self.is_lost = true;
+        self.since = self.settings.prediction.max_lost;
+    }
+
+    /// Where the next scan is expected, in the map.
+    pub fn prediction(&self) -> RigidTransform {
+        self.last * power(self.motion, self.since)
+    }
+
+    /// Gives the numbers of scans whose poses the last one has disproved.
+    pub fn take_disproved(&mut self) -> Vec<usize> {
+        std::mem::take(&mut self.disproved)
+    }
+
+    /// The pose of another scan near one of several starts, or where it lies best if it is rotated about the first, if
+    /// the map alone leaves no doubt of it.
+    pub fn located(&self, scan: &ThinnedScan, starts: &[RigidTransform]) -> Option<ScanAlignment> {
+        let settings = &self.settings.relocalisation;
+        let distance = self.correspondence_distance().max(settings.max_correspondence_distance);
+        let rotated = starts.first().into_iter().flat_map(|around| {
+            rotations_on_map(scan.coarse.points(), &self.map, around, settings)
+        });
+        let found = starts.iter().copied().chain(rotated);
+        found
+            .filter_map(|start| self.aligned_within(scan, start, distance))
+            .filter(|found| found.free_directions.is_empty() && self.is_met(found))
+            .max_by(|a, b| a.overlap.total_cmp(&b.overlap))
+    }
+
+    /// From a scan to the next one, in voxels.
+    pub fn motion(&self) -> RigidTransform {
+        self.motion
     }
 
     /// Passes over a scan without a pose.
     pub fn skip(&mut self) {
         self.number += 1;
         self.since += 1;
+        if self.since > self.settings.prediction.max_lost {
+            // Where the sensor went meanwhile, nobody knows.
+            self.motion = RigidTransform::identity();
+        }
     }
 
     /// Finds the pose of the next scan: none if it is lost, and several where it confirms those before.
@@ -140,15 +173,20 @@ impl Tracker {
             };
             return self.take(scan, first);
         }
-        let prediction = self.last * power(self.motion, self.since);
-        let tracked = self.aligned(scan, prediction);
-        let chosen = match tracked {
-            Some(found) if self.expectation.is_met(&found) => Some((found, ScanStatus::Tracked)),
-            doubted => self.relocalised_or_doubted(scan, doubted, &prediction),
+        self.since_search = self.since_search.saturating_add(1);
+        let prediction = self.prediction();
+        let first = self.aligned(scan, prediction);
+        if std::env::var("SURFSIG_DEBUG").is_ok() {
+            match &first {
+                Some(f) => eprintln!("DBG {} pts {} ov {:.2} known {:.2} free {:.3} unexpl {:.3} dev {:.3} err {:.2} reach {:.2} fd {} met {} bel {} lost {} trial {} exp {} mapsize {}", self.number, scan.points.len(), f.overlap, f.known, f.free_space, f.unexplained, f.deviation(self.median_range), self.prediction_error(&prediction, f), self.correspondence_distance(), f.free_directions.len(), self.is_met(f), self.is_believable(f), self.is_lost, self.trial.len(), self.is_expected(f, &prediction), self.map.len()),
+                None => eprintln!("DBG {} none lost {} trial {}", self.number, self.is_lost, self.trial.len()),
+            }
+        }
+        let chosen = match first {
+            Some(found) if self.is_met(&found) => Some((found, ScanStatus::Tracked)),
+            doubted => self.found_elsewhere_or_doubted(scan, doubted, &prediction),
         };
-        let min_overlap = self.settings.expectation.min_overlap;
-        let believed = chosen.filter(|(found, _)| found.overlap >= min_overlap);
-        let Some((found, status)) = believed else {
+        let Some((found, status)) = chosen.filter(|(found, _)| self.is_believable(found)) else {
             self.lose();
             return Vec::new();
         };
@@ -171,42 +209,56 @@ impl Tracker {
                 self.predictions += 1.0;
             }
         }
+        self.remember_doubt(&step, &found);
         self.expectation.add(&found);
         self.take(scan, step)
     }
 
-    /// The pose found among keyframes, or else the doubted one where it may be kept.
-    fn relocalised_or_doubted(
-        &mut self,
-        scan: &ThinnedScan,
-        doubted: Option<ScanAlignment>,
-        prediction: &RigidTransform,
-    ) -> Option<(ScanAlignment, ScanStatus)> {
-        let is_met =
-            |found: &ScanAlignment| found.free_directions.is_empty() && self.expectation.is_met(found);
-        let searched = self.keyframes.find(scan, self.map_range, is_met);
-        if let Some((found, map)) = searched.filter(|(found, _)| self.is_better(found, doubted.as_ref())) {
-            self.map = map;
-            self.trial.clear();
-            return Some((found, ScanStatus::Relocalised));
+    fn is_met(&self, found: &ScanAlignment) -> bool {
+        self.expectation.is_met(found) && self.is_believable(found)
+    }
+
+    fn is_believable(&self, found: &ScanAlignment) -> bool {
+        self.expectation.is_believable(found, self.median_range)
+    }
+
+    /// Keeps the numbers of doubted poses until one is beyond doubt: if that is found elsewhere, they were wrong.
+    fn remember_doubt(&mut self, step: &Step, found: &ScanAlignment) {
+        let is_elsewhere = self.trial.first().is_some_and(|first| first.status == ScanStatus::Relocalised);
+        if is_elsewhere && !self.trial_is_there {
+            self.disproved = std::mem::take(&mut self.doubted);
+            for number in &self.disproved {
+                if let Some(pose) = self.mapped.get_mut(*number) {
+                    *pose = None;
+                }
+            }
+            self.keyframes.remove(&self.disproved);
+        } else if self.expectation.is_met(found) {
+            self.doubted.clear();
+        } else {
+            self.doubted.push(step.number);
         }
-        let kept = doubted.filter(|found| self.is_expected(found, prediction));
-        kept.map(|found| (found, ScanStatus::Tracked))
     }
 
     fn lose(&mut self) {
         self.skip();
         self.trial.clear();
+        self.trial_is_there = false;
         self.is_lost = true;
-        if self.since > self.settings.prediction.max_lost {
-            // Where the sensor went meanwhile, nobody knows.
-            self.motion = RigidTransform::identity();
-        }
     }
 
     fn aligned(&self, scan: &ThinnedScan, start: RigidTransform) -> Option<ScanAlignment> {
+        self.aligned_within(scan, start, self.correspondence_distance())
+    }
+
+    fn aligned_within(
+        &self,
+        scan: &ThinnedScan,
+        start: RigidTransform,
+        distance: f64,
+    ) -> Option<ScanAlignment> {
         let known = |pose: &RigidTransform| self.keyframes.would_have_seen(pose);
-        align(scan, &self.map, start, self.correspondence_distance(), &self.settings.alignment, known)
+        align(scan, &self.map, start, distance, &self.settings.alignment, known)
     }
 
     /// As far as predictions were wrong (KISS-ICP's threshold, Vizzo and others, 2023).
@@ -246,10 +298,15 @@ impl Tracker {
     /// Keeps back poses in a known part of the map until one is certain or enough have followed each other: parts that
     /// look alike from one viewpoint differ a little farther on.
     fn stays_on_trial(&mut self, step: &Step, found: &ScanAlignment) -> bool {
+        let is_near = self.trial.is_empty() && !self.is_lost && {
+            let moved = step.T_map_scan.translation - self.prediction().translation;
+            moved.norm() <= self.correspondence_distance()
+        };
+        self.trial_is_there |= is_near;
         self.trial.push(step.clone());
         let settings = &self.settings.relocalisation;
         let needed = match self.trial[0].status {
-            ScanStatus::Relocalised => settings.scans_on_trial,
+            ScanStatus::Relocalised if !self.trial_is_there => settings.scans_on_trial,
             _ => settings.scans_on_trial_there,
         };
         self.is_lost = self.trial.len() < needed && !self.expectation.is_certain(found);
@@ -288,11 +345,15 @@ impl Tracker {
         self.go_on(&step);
         let pose = step.T_map_scan;
         let steps = if self.trial.is_empty() { vec![step] } else { std::mem::take(&mut self.trial) };
+        self.trial_is_there = false;
         if steps[0].status == ScanStatus::Relocalised {
             self.last_mapped = None;
         }
         let Some(step) = steps.last().filter(|_| self.has_moved(&pose)) else { return steps };
         let number = step.number as u32;
+        if self.doubted.is_empty() {
+            self.map.look_through(&scan.range_image, &pose.inverse());
+        }
         // First of all what leaves: new points need no normals that are made with it.
         self.map.keep_within(pose.translation.into(), self.map_range);
         let is_near = |point: &&[f64; 3]| Vector3::from(**point).norm() <= self.map_range;
@@ -307,10 +368,14 @@ impl Tracker {
 
     /// Expects the next scan from here, with the motion since the last one.
     fn go_on(&mut self, step: &Step) {
-        if step.status == ScanStatus::Relocalised {
+        let moved = self.last.inverse() * step.T_map_scan;
+        // A sensor that was found again far off has been carried there, which it does not go on to be.
+        let is_carried = step.status == ScanStatus::Relocalised
+            && moved.translation.norm() > self.correspondence_distance() + self.motion.translation.norm();
+        if is_carried {
             self.motion = RigidTransform::identity();
         } else if self.since == 1 {
-            self.motion = self.last.inverse() * step.T_map_scan;
+            self.motion = moved;
         }
         self.last = step.T_map_scan;
         self.since = 1;
@@ -328,19 +393,6 @@ impl Tracker {
     }
 }
 
-/// The covariance of a sum whose parts may err alike: the least one that none of their correlations exceeds in trace, with
-/// rotations in units of `unit`.
-fn sum_of_alike(one: &Matrix6<f64>, other: &Matrix6<f64>, unit: f64) -> Matrix6<f64> {
-    let size = |covariance: &Matrix6<f64>| {
-        (0..6).map(|k| covariance[(k, k)] * if k < 3 { unit * unit } else { 1.0 }).sum::<f64>().sqrt()
-    };
-    let (of_one, of_other) = (size(one), size(other));
-    if of_one == 0.0 || of_other == 0.0 {
-        return one + other;
-    }
-    one * (1.0 + of_other / of_one) + other * (1.0 + of_one / of_other)
-}
-
 /// The motion of several steps.
 fn power(motion: RigidTransform, steps: usize) -> RigidTransform {
     RigidTransform::exp(motion.log().map(|component| component * steps as f64))
@@ -355,14 +407,6 @@ pub(super) fn rotation_angle(motion: &RigidTransform) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn parts_that_err_alike_add_up_before_they_are_squared() {
-        let one = Matrix6::identity() * 0.04;
-        let sum = sum_of_alike(&one, &(one * 9.0), 5.0);
-        assert!((sum - Matrix6::identity() * 0.64).amax() < 1e-12, "0.2 + 0.6, squared");
-        assert_eq!(sum_of_alike(&one, &Matrix6::zeros(), 5.0), one);
-    }
 
     #[test]
     fn a_motion_that_goes_on_is_repeated() {

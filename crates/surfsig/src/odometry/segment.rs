@@ -1,0 +1,164 @@
+//! A part of a sequence that one map holds, with lengths of its own.
+
+use super::pose_covariance::Covariance;
+use super::result::{ScanPose, ScanStatus};
+use super::scale::Scale;
+use super::settings::OdometrySettings;
+use super::thinned_scan::ThinnedScan;
+use super::tracker::{LEAST_OPEN, Step, Tracker};
+use crate::RigidTransform;
+use crate::alignment::{FreeDirection, infinite_along, motions_beyond};
+use nalgebra::{Matrix6, Vector6};
+
+/// Voxels from the sensor beyond which no point is measured; they are numbered with 32 bits.
+const FARTHEST: f64 = 1e9;
+
+/// A map with its tracker. Lengths are in the scans' unit, but for what the tracker gives.
+#[allow(non_snake_case)]
+pub(super) struct Segment {
+    /// Of the world that poses are given in: segments that are joined have the same.
+    pub number: usize,
+    /// The scan whose frame is that of the world.
+    pub origin: usize,
+    /// The map's first scan.
+    pub first: usize,
+    /// From the map, whose axes are those of its first scan about its sensor, to those of the world's first scan.
+    pub T_world_map: RigidTransform,
+    /// Of the twist in the map's axes by which `T_world_map` is off.
+    pub covariance: Covariance,
+    pub scale: Scale,
+    pub tracker: Tracker,
+    /// Scans with a pose, one after the other.
+    pub tracked: usize,
+}
+
+impl Segment {
+    /// Begins a map with a scan's points about its sensor.
+    pub fn new(number: usize, first: usize, points: &[[f64; 3]], settings: &OdometrySettings) -> Self {
+        let scale = Scale::new(points, settings.voxel, &settings.scale);
+        Self {
+            number,
+            origin: first,
+            first,
+            T_world_map: RigidTransform::identity(),
+            covariance: Covariance::zeros(),
+            tracker: Tracker::new(settings, &scale),
+            scale,
+            tracked: 0,
+        }
+    }
+
+    /// A scan as this map takes it; `None` where too little of it is left.
+    pub fn thinned(&self, points: &[[f64; 3]], settings: &OdometrySettings) -> Option<ThinnedScan> {
+        let per_voxel = 1.0 / self.scale.voxel;
+        let scaled = points.iter().map(|point| point.map(|c| c * per_voxel));
+        let near = scaled.filter(|point| point.iter().all(|c| c.abs() < FARTHEST)).collect();
+        let scan = ThinnedScan::new(near, settings);
+        (scan.points.len() >= settings.scale.min_points).then_some(scan)
+    }
+
+    /// Whether a scan fills far fewer or far more voxels than it should.
+    pub fn is_unfit(&self, scan: Option<&ThinnedScan>, points: usize, settings: &OdometrySettings) -> bool {
+        let filled = scan.map_or(0, |scan| scan.points.len()) as f64;
+        let wanted = settings.scale.wanted(points);
+        settings.voxel.is_none()
+            && (filled < settings.segments.least_filled * wanted
+                || filled > settings.segments.most_filled * settings.scale.voxels_of_scan)
+    }
+
+    /// Takes the next scan, or passes over it.
+    pub fn follow(&mut self, scan: Option<&ThinnedScan>) -> Vec<Step> {
+        let steps = match scan {
+            Some(scan) => self.tracker.follow(scan),
+            None => {
+                self.tracker.skip();
+                Vec::new()
+            }
+        };
+        self.tracked = if steps.is_empty() { 0 } else { self.tracked + 1 };
+        steps
+    }
+
+    /// A scan's pose in the world, about its sensor, and what it is off by, in its axes.
+    pub fn in_world(&self, step: &Step) -> (RigidTransform, Covariance) {
+        let mut pose = step.T_map_scan;
+        pose.translation *= self.scale.voxel;
+        let of_map = self.covariance.carried(&pose.inverse());
+        (self.T_world_map * pose, step.covariance.scaled(self.scale.voxel).and(&of_map))
+    }
+
+    /// What a step says.
+    pub fn found(&self, step: &Step) -> FoundPose {
+        let (pose, covariance) = self.in_world(step);
+        FoundPose {
+            scan: self.first + step.number,
+            segment: self.number,
+            origin: self.origin,
+            T_world_sensor: pose,
+            covariance,
+            free_directions: step.free_directions.clone(),
+            status: step.status,
+            overlap: step.overlap,
+            voxel: self.scale.voxel,
+            unit: self.scale.median_range,
+        }
+    }
+}
+
+/// A scan's pose about its sensor, in the scans' unit, but for free directions, which are in voxels.
+#[allow(non_snake_case)]
+pub(super) struct FoundPose {
+    pub scan: usize,
+    pub segment: usize,
+    /// The scan whose frame is the world's.
+    pub origin: usize,
+    /// In the axes of the world's first sensor.
+    pub T_world_sensor: RigidTransform,
+    /// In the sensor's axes.
+    pub covariance: Covariance,
+    pub free_directions: Vec<FreeDirection>,
+    pub status: ScanStatus,
+    pub overlap: f64,
+    pub voxel: f64,
+    /// The length by which a rotation moves points.
+    pub unit: f64,
+}
+
+impl FoundPose {
+    /// From the sensor's axes to the scan's own frame, and from those of the world's first sensor to that scan's, by
+    /// where sensors are in the frames of their scans.
+    pub fn in_frames(&self, sensors: &[[f64; 3]]) -> ScanPose {
+        let to = |translation: [f64; 3]| RigidTransform::from_rotation_vector([0.0; 3], translation);
+        let (pose, of_pose) = (self.T_world_sensor, &self.covariance);
+        let (voxel, unit) = (self.voxel, self.unit);
+        let from_sensor = to(sensors[self.scan]);
+        // A twist about the sensor as one in the scan's frame.
+        let adjoint = from_sensor.adjoint();
+        let carried = Matrix6::from_fn(|i, j| adjoint[i][j]);
+        let both = of_pose.random + of_pose.systematic;
+        let open: Vec<Vector6<f64>> = motions_beyond(&of_pose.open, LEAST_OPEN * voxel, unit)
+            .iter()
+            .map(|motion| carried * motion)
+            .collect();
+        let covariance = infinite_along(&(carried * both * carried.transpose()), &open, unit);
+        let in_unit = |direction: &FreeDirection| match *direction {
+            FreeDirection::Translation { axis } => FreeDirection::Translation { axis },
+            FreeDirection::Rotation { axis, point } => {
+                FreeDirection::Rotation { axis, point: point.map(|c| c * voxel) }
+            }
+            FreeDirection::RotationAboutPoint { point } => {
+                FreeDirection::RotationAboutPoint { point: point.map(|c| c * voxel) }
+            }
+        };
+        let free = self.free_directions.iter().map(|direction| in_unit(direction).transformed(&from_sensor));
+        ScanPose {
+            scan: self.scan,
+            segment: self.segment,
+            T_map_scan: Some(to(sensors[self.origin]) * pose * from_sensor.inverse()),
+            covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
+            free_directions: free.collect(),
+            status: self.status,
+            overlap: self.overlap,
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! Where the sensor is, if not where it is expected: moved otherwise, rotated, or carried to another keyframe.
+
+use super::super::local_map::LocalMap;
+use super::super::result::ScanStatus;
+use super::super::rotation_search::rotations_on_map;
+use super::super::scan_alignment::ScanAlignment;
+use super::super::thinned_scan::ThinnedScan;
+use super::Tracker;
+use crate::RigidTransform;
+
+impl Tracker {
+    /// The pose found from other starts, by rotations of the sensor or among keyframes, or else the doubted one where it
+    /// may be kept.
+    pub(super) fn found_elsewhere_or_doubted(
+        &mut self,
+        scan: &ThinnedScan,
+        doubted: Option<ScanAlignment>,
+        prediction: &RigidTransform,
+    ) -> Option<(ScanAlignment, ScanStatus)> {
+        if let Some(found) = self.by_another_motion(scan, prediction) {
+            return Some((found, ScanStatus::Tracked));
+        }
+        let kept = doubted.as_ref().filter(|found| self.is_expected(found, prediction));
+        // A search costs several scans, and changes next to nothing where a pose is only doubted.
+        if kept.is_none() || self.since_search >= self.settings.relocalisation.scans_between {
+            self.since_search = 0;
+            if let Some(found) = self.by_rotation(scan, doubted.as_ref()) {
+                self.begin_trial_at(&found);
+                return Some((found, ScanStatus::Relocalised));
+            }
+            if let Some((found, map)) = self.among_keyframes(scan, doubted.as_ref()) {
+                self.begin_trial_at(&found);
+                self.map = map;
+                return Some((found, ScanStatus::Relocalised));
+            }
+        }
+        doubted.filter(|found| self.is_expected(found, prediction)).map(|found| (found, ScanStatus::Tracked))
+    }
+
+    /// From where the sensor was, and from there back by its last motion: one that is shaken comes back.
+    fn by_another_motion(&self, scan: &ThinnedScan, prediction: &RigidTransform) -> Option<ScanAlignment> {
+        let least = self.settings.prediction.min_correspondence_distance;
+        let starts = [self.last, self.last * self.motion.inverse()];
+        let others = starts.into_iter().filter(|start| {
+            self.distance_at_range(&(prediction.inverse() * *start)) > least
+        });
+        others.filter_map(|start| self.aligned(scan, start)).find(|found| {
+            found.free_directions.is_empty() && self.is_met(found)
+        })
+    }
+
+    /// From where the sensor is expected, rotated about itself.
+    fn by_rotation(&self, scan: &ThinnedScan, doubted: Option<&ScanAlignment>) -> Option<ScanAlignment> {
+        let settings = &self.settings.relocalisation;
+        if self.since > self.settings.prediction.max_lost {
+            return None;
+        }
+        let mut around = self.prediction();
+        around.rotation = self.last.rotation;
+        let starts = rotations_on_map(scan.coarse.points(), &self.map, &around, settings);
+        let distance = settings.max_correspondence_distance.max(self.correspondence_distance());
+        let found: Vec<ScanAlignment> = starts
+            .into_iter()
+            .filter_map(|start| self.aligned_within(scan, start, distance))
+            .filter(|found| found.free_directions.is_empty() && self.is_met(found) && self.is_better(found, doubted))
+            .collect();
+        let best = found.iter().max_by(|a, b| a.overlap.total_cmp(&b.overlap))?;
+        // Where several rotations are as good, as in a square room, none is known.
+        let is_rival = |other: &ScanAlignment| {
+            let apart = self.distance_at_range(&(best.T_map_scan.inverse() * other.T_map_scan));
+            apart > distance && other.overlap > best.overlap - settings.overlap_gain
+        };
+        (!found.iter().any(is_rival)).then(|| best.clone())
+    }
+
+    fn among_keyframes(
+        &mut self,
+        scan: &ThinnedScan,
+        doubted: Option<&ScanAlignment>,
+    ) -> Option<(ScanAlignment, LocalMap)> {
+        let (expectation, median_range) = (&self.expectation, self.median_range);
+        let is_met = |found: &ScanAlignment| {
+            found.free_directions.is_empty()
+                && expectation.is_met(found)
+                && expectation.is_believable(found, median_range)
+        };
+        let searched = self.keyframes.find(scan, &self.last, self.map_range, is_met);
+        searched.filter(|(found, _)| self.is_better(found, doubted))
+    }
+
+    /// Ends a trial that a pose found by a search contradicts: the sensor cannot have moved so far.
+    fn begin_trial_at(&mut self, found: &ScanAlignment) {
+        let reach = self.correspondence_distance().max(self.median_range * self.settings.prediction.first_error);
+        let moved = (found.T_map_scan.translation - self.last.translation).norm();
+        if moved > reach + self.motion.translation.norm() * self.since as f64 {
+            self.trial.clear();
+        }
+    }
+}
