@@ -133,9 +133,7 @@ def scanned(
     scene: simulate.Scene, sensor: simulate.Lidar | simulate.DepthCamera, true: Array, seed: int
 ) -> list[PointCloud]:
     """Scan a scene from each pose."""
-    return [
-        simulate.scan(scene, sensor, pose, seed=1000 * seed + number) for number, pose in enumerate(true)
-    ]
+    return [simulate.scan(scene, sensor, pose, seed=1000 * seed + number) for number, pose in enumerate(true)]
 
 
 def box(middle: tuple[float, float, float], size: tuple[float, float, float]) -> simulate.Placed:

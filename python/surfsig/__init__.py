@@ -51,7 +51,7 @@ from surfsig.files import (
 from surfsig.finding import Instance, Instances, Library, LibraryEntry, find_instances
 from surfsig.flat_atom import flat_atom_length
 from surfsig.missing_returns import remove_missing_returns
-from surfsig.odometry import Odometry, ScanStatus, estimate_odometry
+from surfsig.odometry import Odometry, ScanStatus, TrackedScan, Tracker, deskew, estimate_odometry
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import EqualSurfaces, Piece, Recurrence, Recurrences, find_recurrences
 from surfsig.registration import (
@@ -149,10 +149,13 @@ __all__ = [
     "TileSurfaces",
     "TilesFailedError",
     "TimedScan",
+    "TrackedScan",
+    "Tracker",
     "Trajectory",
     "__version__",
     "crop",
     "downsample",
+    "deskew",
     "estimate_odometry",
     "extract",
     "extract_field_signatures",

@@ -1,6 +1,17 @@
-"""The trajectory of a sensor, from its scans: `estimate_odometry`."""
+"""The trajectory of a sensor, from its scans: `estimate_odometry`, or scan by scan `Tracker`."""
 
+from surfsig.odometry.point_times import PointTimes, deskew, point_times
 from surfsig.odometry.result import Odometry, ScanStatus
 from surfsig.odometry.search import estimate_odometry
+from surfsig.odometry.tracker import TrackedScan, Tracker
 
-__all__ = ["Odometry", "ScanStatus", "estimate_odometry"]
+__all__ = [
+    "Odometry",
+    "PointTimes",
+    "ScanStatus",
+    "TrackedScan",
+    "Tracker",
+    "deskew",
+    "estimate_odometry",
+    "point_times",
+]

@@ -35,7 +35,8 @@ class ScanStatus(enum.IntEnum):
 class Odometry:
     """The trajectory of a sensor: one struct of arrays, with a status for each of n scans.
 
-    The world is the frame of the first scan that has a pose. NaN stands where there is none.
+    The world is the frame of the first scan that has a pose; where a sensor stays lost, another one begins
+    (`segments`). NaN stands where there is none.
     """
 
     poses: Array
@@ -47,9 +48,6 @@ class Odometry:
     as that variance grows."""
     status: NDArray[np.uint8]
     """`ScanStatus` as a number, (n,)."""
-    segments: NDArray[np.int64]
-    """Number of the world that each pose is given in, (n,): where a sensor stays lost, another map is begun, whose
-    first scan is its world; -1 where there is no pose."""
     overlaps: Array
     """Share of the scan's points that lie on the map, (n,); 0 where there is no pose."""
     free_directions: list[list[FreeDirection]]
@@ -61,6 +59,12 @@ class Odometry:
     voxel: float
     """Edge of the voxels in which scans and map were thinned, in the scans' unit; NaN if no scan had enough
     points."""
+    segments: NDArray[np.int64]
+    """Number of the world that each pose is given in, (n,): where a sensor stays lost, another map is begun, whose
+    first scan is its world; -1 where there is no pose."""
+    twists: Array
+    """Of the sensor at each scan, (n, 6): rotation vector in radians and translation, each a second, in the scan's
+    own axes. NaN where the times of points are not known, and where there is no pose."""
 
     def __len__(self) -> int:
         """Return the number of scans."""
@@ -116,6 +120,28 @@ class Odometry:
 
     @property
     def length(self) -> float:
-        """Length of the trajectory, in the scans' unit: straight lines between the scans that have a pose."""
-        positions = self.poses[np.isfinite(self.poses).all(axis=(1, 2)), :3, 3]
-        return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
+        """Length of the trajectory, in the scans' unit: straight lines between scans that have poses in one world."""
+        known = np.flatnonzero(self.segments >= 0)
+        steps = np.linalg.norm(np.diff(self.poses[known, :3, 3], axis=0), axis=1)
+        return float(steps[np.diff(self.segments[known]) == 0].sum())
+
+    @property
+    def longest_segment(self) -> int:
+        """Number of the segment with the most scans; the first of several, and -1 where no scan has a pose."""
+        numbers = self.segments[self.segments >= 0]
+        return int(np.bincount(numbers).argmax()) if len(numbers) else -1
+
+    def poses_of(self, segment: int) -> Array:
+        """Give the poses in one world.
+
+        Parameters
+        ----------
+        segment
+            Its number.
+
+        Returns
+        -------
+        numpy.ndarray
+            T_world_scan, (n, 4, 4); NaN for scans that are in another one or have no pose.
+        """
+        return np.where((self.segments == segment)[:, None, None], self.poses, np.nan)

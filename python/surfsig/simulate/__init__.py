@@ -22,7 +22,7 @@ from .places import block, corridor, forest, hall, pipes, plane, room, storey, t
 from .poses import UP, facing, pose, turn
 from .scanner import Scanner
 from .scene import Hits, Placed, Scene
-from .sensors import Calibration, DepthCamera, Lidar, bent_calibration, distorted, scan
+from .sensors import Calibration, DepthCamera, Lidar, bent_calibration, distorted, scan, scan_moving
 from .surfaces import Box, Cone, Cylinder, Plane, Rectangle, Sphere, Surface
 
 __all__ = [
@@ -64,6 +64,7 @@ __all__ = [
     "pose",
     "room",
     "scan",
+    "scan_moving",
     "storey",
     "transform_points",
     "tunnel",

@@ -58,11 +58,16 @@ impl Expectation {
         found.free_directions.is_empty() && full && explained && !self.is_contradicted(found)
     }
 
-    /// Whether a new room, or something that moves, may be all that is unexpected.
-    pub fn may_be_new(&self, found: &ScanAlignment) -> bool {
-        let departed = found.free_space <= self.free_space() + self.settings.departed_excess;
-        let arrived = found.unexplained <= self.largest_unexplained() + self.settings.arrived_excess;
-        departed && arrived
+    /// Whether a new room, or something that moves, may be all that is unexpected; `distance` is that from the expected
+    /// pose, in voxels at the median range.
+    pub fn may_be_new(&self, found: &ScanAlignment, distance: f64) -> bool {
+        let settings = &self.settings;
+        let (departed, arrived) = match distance <= settings.near {
+            true => (settings.departed_excess_near, settings.arrived_excess_near),
+            false => (settings.departed_excess, settings.arrived_excess),
+        };
+        found.free_space <= self.free_space() + departed
+            && found.unexplained <= self.largest_unexplained() + arrived
     }
 
     /// Whether enough of the scan lies on the map, and determines its pose, where a point at a range counts.
@@ -108,6 +113,7 @@ mod tests {
             systematic: Matrix6::zeros(),
             free_directions: Vec::new(),
             scans: Vec::new(),
+            within: None,
         }
     }
 
@@ -130,9 +136,11 @@ mod tests {
         assert!(expectation.is_certain(&lying(0.75, 0.0, 0.019)));
         assert!(!expectation.is_certain(&lying(0.74, 0.0, 0.0)));
         assert!(!expectation.is_certain(&lying(0.8, 0.0, 0.021)));
-        assert!(expectation.may_be_new(&lying(0.5, 0.06, 0.22)));
-        assert!(!expectation.may_be_new(&lying(0.5, 0.0, 0.24)));
-        assert!(!expectation.may_be_new(&lying(0.5, 0.08, 0.0)));
+        assert!(expectation.may_be_new(&lying(0.5, 0.06, 0.22), 1.0));
+        assert!(!expectation.may_be_new(&lying(0.5, 0.0, 0.24), 1.0));
+        assert!(!expectation.may_be_new(&lying(0.5, 0.08, 0.0), 1.0));
+        assert!(expectation.may_be_new(&lying(0.5, 0.3, 0.4), 0.5));
+        assert!(!expectation.may_be_new(&lying(0.5, 0.4, 0.0), 0.5));
     }
 
     #[test]

@@ -8,6 +8,7 @@ use crate::visibility::{SphericalRangeImage, Visibility};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 /// Distance up to which a point's neighbourhood counts as dense: those that change one are then found in the blocks
@@ -83,6 +84,17 @@ impl LocalMap {
                 found.iter().map(|(_, index)| self.points[*index as usize].into()).collect();
             surface_goes_on(&around)
         })
+    }
+
+    /// Adds another map's points where they are after a motion.
+    pub fn add_moved(&mut self, other: &Self, motion: &RigidTransform) {
+        let mut of_scans: BTreeMap<u32, Vec<[f64; 3]>> = BTreeMap::new();
+        for (point, scan) in other.points.iter().zip(&other.scans) {
+            of_scans.entry(*scan).or_default().push(motion.transform_point(*point));
+        }
+        for (scan, points) in of_scans {
+            self.add(points, scan);
+        }
     }
 
     pub fn scans(&self) -> &[u32] {
@@ -226,7 +238,6 @@ mod tests {
     use super::*;
     use crate::KdTree;
     use proptest::prelude::*;
-    use std::collections::BTreeMap;
 
     fn map_of(scans: &[Vec<[f64; 3]>]) -> LocalMap {
         let mut map = LocalMap::new(&MapSettings::default());

@@ -8,6 +8,7 @@
 //! fit, another map is begun ([`segment`], [`segments`]).
 
 mod correspondences;
+mod deskewing;
 mod expectation;
 mod keyframes;
 mod local_map;
@@ -24,7 +25,7 @@ mod thinned_scan;
 mod tracker;
 mod voxel_index;
 
-pub use result::{ScanPose, ScanStatus};
+pub use result::{LoopClosure, ScanPose, ScanStatus};
 pub use settings::{
     ExpectationSettings, MapSettings, OdometrySettings, PredictionSettings, RelocalisationSettings,
     ScaleSettings, ScanAlignmentSettings, SegmentSettings,
@@ -33,6 +34,9 @@ pub use settings::{
 use crate::{Error, Scan, with_threads};
 use segments::Segments;
 use thinned_scan::SensorPosition;
+
+/// Intervals between scans beyond which a point's time is none.
+const LARGEST_TIME: f64 = 10.0;
 
 /// Follows a sensor from scan to scan.
 ///
@@ -76,6 +80,7 @@ pub struct Odometry {
     sensors: Vec<[f64; 3]>,
     poses: Vec<ScanPose>,
     segments: Segments,
+    loops: Vec<LoopClosure>,
 }
 
 impl std::fmt::Debug for Odometry {
@@ -95,7 +100,7 @@ impl Odometry {
         settings.check()?;
         let segments = Segments::new(&settings);
         let sensor_position = SensorPosition::default();
-        Ok(Self { settings, sensor_position, sensors: Vec::new(), poses: Vec::new(), segments })
+        Ok(Self { settings, sensor_position, sensors: Vec::new(), poses: Vec::new(), segments, loops: Vec::new() })
     }
 
     /// Takes the next scan, in its own frame, in which the sensor is at the viewpoint, or at 0 where none is given.
@@ -117,7 +122,31 @@ impl Odometry {
     /// # Ok::<(), surfsig::Error>(())
     /// ```
     pub fn push(&mut self, scan: &Scan<'_>) -> Result<Vec<ScanPose>, Error> {
-        with_threads(self.settings.threads, || self.push_here(scan))
+        with_threads(self.settings.threads, || self.push_here(scan, None))
+    }
+
+    /// Takes the next scan of a sensor that moves while it scans: each point has the time at which it was measured, in
+    /// intervals from this scan to the next one, from the time on of which the pose is asked. Points are taken to where
+    /// they would have been measured at that time, by a constant twist that is refined with the pose
+    /// ([`ScanPose::twist`]).
+    ///
+    /// # Errors
+    /// [`Error::Threads`] where the system refuses the threads; [`Error::TimesMismatch`] if there are not as many times
+    /// as points.
+    ///
+    /// ```
+    /// use surfsig::{Odometry, OdometrySettings, PointCloud, Scan};
+    /// let mut odometry = Odometry::new(OdometrySettings::default())?;
+    /// let few = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// assert!(odometry.push_timed(&Scan::new(PointCloud::new(&few)), &[-0.5, 0.5])?[0].twist.is_none());
+    /// assert!(odometry.push_timed(&Scan::new(PointCloud::new(&few)), &[0.0]).is_err());
+    /// # Ok::<(), surfsig::Error>(())
+    /// ```
+    pub fn push_timed(&mut self, scan: &Scan<'_>, times: &[f64]) -> Result<Vec<ScanPose>, Error> {
+        if times.len() != scan.cloud.len() {
+            return Err(Error::TimesMismatch { times: times.len(), points: scan.cloud.len() });
+        }
+        with_threads(self.settings.threads, || self.push_here(scan, Some(times)))
     }
 
     /// The results of all scans so far. One that is lost may still get a pose by the next scans.
@@ -129,6 +158,18 @@ impl Odometry {
     /// ```
     pub fn poses(&self) -> &[ScanPose] {
         &self.poses
+    }
+
+    /// Scans that the sensor has come back with to where it was. Poses of scans on the way around stay as they were given:
+    /// a pose graph distributes the drift over them.
+    ///
+    /// ```
+    /// let odometry = surfsig::Odometry::new(surfsig::OdometrySettings::default())?;
+    /// assert!(odometry.loops().is_empty());
+    /// # Ok::<(), surfsig::Error>(())
+    /// ```
+    pub fn loops(&self) -> &[LoopClosure] {
+        &self.loops
     }
 
     /// Edge of the voxels in which scans and the present map are thinned, in the scans' unit; `None` before a scan has
@@ -143,16 +184,21 @@ impl Odometry {
         self.segments.voxel()
     }
 
-    fn push_here(&mut self, scan: &Scan<'_>) -> Vec<ScanPose> {
+    fn push_here(&mut self, scan: &Scan<'_>, times: Option<&[f64]>) -> Vec<ScanPose> {
         let farthest = self.settings.scale.farthest_viewpoint;
-        let (points, sensor) = self.sensor_position.about_sensor(scan, farthest);
+        // A time that nobody knows is that of the pose.
+        let known = |time: &f64| if time.abs() <= LARGEST_TIME { *time } else { 0.0 };
+        let times: Option<Vec<f64>> = times.map(|times| times.iter().map(known).collect());
+        let (measured, sensor) = self.sensor_position.about_sensor(scan, times.as_deref(), farthest);
+        let points = &measured.points;
         let number = self.poses.len();
         self.sensors.push(sensor);
         let is_usable =
             points.len() >= self.settings.scale.min_points && points.iter().any(|point| *point != points[0]);
-        let followed = self.segments.follow(is_usable.then_some(points));
+        let followed = self.segments.follow(is_usable.then_some(measured));
         let status = if followed.is_thin { ScanStatus::TooFewPoints } else { ScanStatus::Lost };
         self.poses.push(ScanPose::none(number, status));
+        self.loops.extend(followed.loops.iter().map(|found| found.in_frames(&self.sensors)));
         let mut changed = followed.disproved;
         for index in &changed {
             self.poses[*index] = ScanPose::none(*index, ScanStatus::Lost);

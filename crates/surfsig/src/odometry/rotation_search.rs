@@ -15,8 +15,7 @@ pub(super) fn rotations_on_map(
     around: &RigidTransform,
     settings: &RelocalisationSettings,
 ) -> Vec<RigidTransform> {
-    let some: Vec<[f64; 3]> =
-        some_of(points.len(), settings.rotation_points).into_iter().map(|number| points[number]).collect();
+    let some = some_points(points, settings.rotation_points);
     let steps = (2.0 * PI / settings.rotation_step).floor().max(1.0) as usize;
     // About each axis from no rotation to a whole one.
     let tried: Vec<(usize, RigidTransform)> = (0..3)
@@ -28,11 +27,7 @@ pub(super) fn rotations_on_map(
             (steps * axis + step, *around * RigidTransform::from_rotation_vector(vector, [0.0; 3]))
         })
         .collect();
-    let near = |pose: &RigidTransform| {
-        let is_near =
-            |point: &&[f64; 3]| map.nearest(pose.transform_point(**point), settings.rotation_distance).is_some();
-        some.iter().filter(is_near).count()
-    };
+    let near = |pose: &RigidTransform| points_near(&some, map, pose, settings.rotation_distance);
     let mut counts = vec![0; 3 * steps];
     let found: Vec<usize> = tried.par_iter().map(|(_, pose)| near(pose)).collect();
     for ((number, _), count) in tried.iter().zip(found) {
@@ -50,6 +45,16 @@ pub(super) fn rotations_on_map(
     let mut peaks: Vec<&(usize, RigidTransform)> = tried.iter().filter(|(number, _)| is_peak(*number)).collect();
     peaks.sort_by_key(|(number, _)| std::cmp::Reverse(counts[*number]));
     peaks.into_iter().take(settings.rotation_trials).map(|(_, pose)| *pose).collect()
+}
+
+/// Some of a scan's points, by which poses are compared.
+pub(super) fn some_points(points: &[[f64; 3]], count: usize) -> Vec<[f64; 3]> {
+    some_of(points.len(), count).into_iter().map(|number| points[number]).collect()
+}
+
+/// How many points of a scan at a pose come near the map.
+pub(super) fn points_near(points: &[[f64; 3]], map: &LocalMap, pose: &RigidTransform, distance: f64) -> usize {
+    points.iter().filter(|point| map.nearest(pose.transform_point(**point), distance).is_some()).count()
 }
 
 #[cfg(test)]

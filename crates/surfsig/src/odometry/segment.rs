@@ -1,11 +1,12 @@
 //! A part of a sequence that one map holds, with lengths of its own.
 
+use super::deskewing::{MeasuredScan, MotionWithin};
 use super::pose_covariance::Covariance;
-use super::result::{ScanPose, ScanStatus};
+use super::result::{LoopClosure, ScanPose, ScanStatus};
 use super::scale::Scale;
 use super::settings::OdometrySettings;
 use super::thinned_scan::ThinnedScan;
-use super::tracker::{LEAST_OPEN, Step, Tracker};
+use super::tracker::{LEAST_OPEN, Loop, Step, Tracker};
 use crate::RigidTransform;
 use crate::alignment::{FreeDirection, infinite_along, motions_beyond};
 use nalgebra::{Matrix6, Vector6};
@@ -49,12 +50,29 @@ impl Segment {
     }
 
     /// A scan as this map takes it; `None` where too little of it is left.
-    pub fn thinned(&self, points: &[[f64; 3]], settings: &OdometrySettings) -> Option<ThinnedScan> {
+    pub fn thinned(&self, scan: &MeasuredScan, settings: &OdometrySettings) -> Option<ThinnedScan> {
+        self.thinned_with(scan, self.tracker.expected_within(), settings)
+    }
+
+    /// The same with another motion within the scan, in voxels.
+    pub fn thinned_with(
+        &self,
+        scan: &MeasuredScan,
+        within: MotionWithin,
+        settings: &OdometrySettings,
+    ) -> Option<ThinnedScan> {
         let per_voxel = 1.0 / self.scale.voxel;
-        let scaled = points.iter().map(|point| point.map(|c| c * per_voxel));
-        let near = scaled.filter(|point| point.iter().all(|c| c.abs() < FARTHEST)).collect();
-        let scan = ThinnedScan::new(near, settings);
-        (scan.points.len() >= settings.scale.min_points).then_some(scan)
+        let is_near = |point: &[f64; 3]| point.iter().all(|c| c.abs() * per_voxel < FARTHEST);
+        let near: Vec<bool> = scan.points.iter().map(is_near).collect();
+        let points = scan.points.iter().zip(&near).filter(|(_, near)| **near);
+        let times = scan.times.as_ref().map(|times| {
+            times.iter().zip(&near).filter(|(_, near)| **near).map(|(time, _)| *time).collect()
+        });
+        let points = points.map(|(point, _)| point.map(|c| c * per_voxel)).collect();
+        let scan = ThinnedScan::new(MeasuredScan { points, times }, within, settings);
+        // A sparse scan has voxels for a share of its points.
+        let least = settings.scale.largest_filled_share * settings.scale.min_points as f64;
+        (scan.points.len() as f64 >= least).then_some(scan)
     }
 
     /// Whether a scan fills far fewer or far more voxels than it should.
@@ -87,6 +105,22 @@ impl Segment {
         (self.T_world_map * pose, step.covariance.scaled(self.scale.voxel).and(&of_map))
     }
 
+    /// The loops that the last scan has closed.
+    pub fn take_loops(&mut self) -> Vec<FoundLoop> {
+        let in_unit = |mut transform: RigidTransform| {
+            transform.translation *= self.scale.voxel;
+            transform
+        };
+        let found = |one: Loop| FoundLoop {
+            scan: self.first + one.scan,
+            earlier: self.first + one.earlier,
+            origin: self.origin,
+            T_earlier_scan: in_unit(one.T_earlier_scan),
+            T_world_scan_before: self.T_world_map * in_unit(one.T_map_scan_before),
+        };
+        self.tracker.take_loops().into_iter().map(found).collect()
+    }
+
     /// What a step says.
     pub fn found(&self, step: &Step) -> FoundPose {
         let (pose, covariance) = self.in_world(step);
@@ -101,6 +135,34 @@ impl Segment {
             overlap: step.overlap,
             voxel: self.scale.voxel,
             unit: self.scale.median_range,
+            twist: step.twist.map(|twist| {
+                Vector6::from_fn(|k, _| if k < 3 { twist[k] } else { twist[k] * self.scale.voxel })
+            }),
+        }
+    }
+}
+
+/// A scan that lies on what an earlier one saw: poses about their sensors, in the scans' unit.
+#[allow(non_snake_case)]
+pub(super) struct FoundLoop {
+    pub scan: usize,
+    pub earlier: usize,
+    /// The scan whose frame is the world's.
+    pub origin: usize,
+    pub T_earlier_scan: RigidTransform,
+    pub T_world_scan_before: RigidTransform,
+}
+
+impl FoundLoop {
+    /// From the sensors' axes to the scans' own frames.
+    pub fn in_frames(&self, sensors: &[[f64; 3]]) -> LoopClosure {
+        let to = |scan: usize| RigidTransform::from_rotation_vector([0.0; 3], sensors[scan]);
+        let from_sensor = to(self.scan).inverse();
+        LoopClosure {
+            scan: self.scan,
+            earlier: self.earlier,
+            T_earlier_scan: to(self.earlier) * self.T_earlier_scan * from_sensor,
+            T_map_scan_before: to(self.origin) * self.T_world_scan_before * from_sensor,
         }
     }
 }
@@ -122,6 +184,8 @@ pub(super) struct FoundPose {
     pub voxel: f64,
     /// The length by which a rotation moves points.
     pub unit: f64,
+    /// From scan to scan, in the sensor's axes.
+    pub twist: Option<Vector6<f64>>,
 }
 
 impl FoundPose {
@@ -159,6 +223,7 @@ impl FoundPose {
             free_directions: free.collect(),
             status: self.status,
             overlap: self.overlap,
+            twist: self.twist.map(|twist| (carried * twist).into()),
         }
     }
 }

@@ -1,10 +1,12 @@
 //! The maps of a sequence: the present one, one on trial beside it, and those before.
 
+use super::deskewing::{MeasuredScan, MotionWithin};
 use super::pose_covariance::Covariance;
-use super::segment::{FoundPose, Segment};
+use super::segment::{FoundLoop, FoundPose, Segment};
 use super::settings::OdometrySettings;
 use super::tracker::Step;
 use crate::RigidTransform;
+use nalgebra::Vector6;
 
 /// What a scan has led to.
 #[derive(Default)]
@@ -13,6 +15,8 @@ pub(super) struct Followed {
     pub found: Vec<FoundPose>,
     /// Scans whose poses were wrong.
     pub disproved: Vec<usize>,
+    /// Loops that the scan has closed, about the sensors.
+    pub loops: Vec<FoundLoop>,
     /// Whether too little of the scan was left to align it.
     pub is_thin: bool,
 }
@@ -21,8 +25,7 @@ pub(super) struct Followed {
 #[allow(non_snake_case)]
 struct Anchor {
     scan: usize,
-    /// About the sensor.
-    points: Vec<[f64; 3]>,
+    measured: MeasuredScan,
     T_world_sensor: RigidTransform,
     covariance: Covariance,
     /// From this scan to the next one.
@@ -68,30 +71,35 @@ impl Segments {
         self.segments.last().map(|segment| segment.scale.voxel)
     }
 
-    /// Takes the next scan, if it is one: its points about its sensor.
-    pub fn follow(&mut self, points: Option<Vec<[f64; 3]>>) -> Followed {
+    /// Takes the next scan, if it is one.
+    pub fn follow(&mut self, scan: Option<MeasuredScan>) -> Followed {
         let number = self.count;
         self.count += 1;
-        let Some(points) = points else {
+        let Some(measured) = scan else {
             self.segments.iter_mut().for_each(|segment| drop(segment.follow(None)));
             self.candidate = None;
             return Followed { is_thin: true, ..Followed::default() };
         };
         if self.segments.is_empty() {
-            self.segments.push(Segment::new(self.worlds, number, &points, &self.settings));
+            let segment = Segment::new(self.worlds, number, &measured.points, &self.settings);
+            if segment.thinned(&measured, &self.settings).is_none() {
+                return Followed { is_thin: true, ..Followed::default() };
+            }
+            self.segments.push(segment);
             self.worlds += 1;
         }
         let count = self.segments.len();
         let (past, present) = self.segments.split_at_mut(count - 1);
         let segment = &mut present[0];
-        let scan = segment.thinned(&points, &self.settings);
+        let scan = segment.thinned(&measured, &self.settings);
         let mut followed = Followed { is_thin: scan.is_none(), ..Followed::default() };
-        let is_unfit = segment.is_unfit(scan.as_ref(), points.len(), &self.settings);
+        let is_unfit = segment.is_unfit(scan.as_ref(), measured.points.len(), &self.settings);
         let steps = segment.follow(scan.as_ref());
         followed.disproved =
             segment.tracker.take_disproved().into_iter().map(|step| segment.first + step).collect();
         followed.found = steps.iter().map(|step| segment.found(step)).collect();
-        let returned = steps.is_empty().then(|| search_past(past, &points, self.searched, &self.settings));
+        followed.loops = segment.take_loops();
+        let returned = steps.is_empty().then(|| search_past(past, &measured, self.searched, &self.settings));
         if returned.is_none() {
             past.iter_mut().for_each(|segment| segment.tracker.skip());
         }
@@ -110,12 +118,12 @@ impl Segments {
                 true => self.settings.segments.scans_lost,
                 false => self.settings.segments.scans_unfit,
             };
-            self.try_another_map(&points, needed, &mut followed);
+            self.try_another_map(&measured, needed, &mut followed);
         } else {
             self.candidate = None;
         }
         if let (None, Some(step)) = (&self.candidate, steps.last()) {
-            self.remember(number, points, step);
+            self.remember(number, measured, step);
         }
         followed
     }
@@ -131,21 +139,21 @@ impl Segments {
         }
     }
 
-    fn remember(&mut self, scan: usize, points: Vec<[f64; 3]>, step: &Step) {
+    fn remember(&mut self, scan: usize, measured: MeasuredScan, step: &Step) {
         let Some(segment) = self.segments.last().filter(|segment| segment.first + step.number == scan) else {
             return;
         };
         let (pose, covariance) = segment.in_world(step);
         let mut motion = segment.tracker.motion();
         motion.translation *= segment.scale.voxel;
-        self.anchor = Some(Anchor { scan, points, T_world_sensor: pose, covariance, motion: motion.log() });
+        self.anchor = Some(Anchor { scan, measured, T_world_sensor: pose, covariance, motion: motion.log() });
     }
 
     /// Follows the scan through a map that was begun when the present one failed.
-    fn try_another_map(&mut self, points: &[[f64; 3]], needed: usize, followed: &mut Followed) {
+    fn try_another_map(&mut self, measured: &MeasuredScan, needed: usize, followed: &mut Followed) {
         let number = self.count - 1;
         if let Some(candidate) = &mut self.candidate {
-            let scan = candidate.segment.thinned(points, &self.settings);
+            let scan = candidate.segment.thinned(measured, &self.settings);
             let steps = candidate.segment.follow(scan.as_ref());
             if steps.is_empty() {
                 self.candidate = None;
@@ -154,12 +162,12 @@ impl Segments {
             }
         }
         if self.candidate.is_none() {
-            let mut segment = Segment::new(self.worlds, number, points, &self.settings);
+            let mut segment = Segment::new(self.worlds, number, &measured.points, &self.settings);
             let ratio = self.voxel().map_or(f64::INFINITY, |voxel| (segment.scale.voxel / voxel).ln().abs());
             if needed == self.settings.segments.scans_unfit && ratio < self.settings.segments.least_ratio.ln() {
                 return;
             }
-            let scan = segment.thinned(points, &self.settings);
+            let scan = segment.thinned(measured, &self.settings);
             let steps = segment.follow(scan.as_ref());
             if steps.is_empty() {
                 return;
@@ -191,7 +199,11 @@ impl Segments {
 
     /// The pose of the scan before in another map, in the scans' unit, and what the map's pose in the world is off by.
     fn joined(&self, anchor: &Anchor, segment: &Segment) -> Option<(RigidTransform, Covariance)> {
-        let scan = segment.thinned(&anchor.points, &self.settings)?;
+        let within = MotionWithin {
+            twist: Vector6::from_fn(|k, _| anchor.motion[k] / if k < 3 { 1.0 } else { segment.scale.voxel }),
+            ..segment.tracker.expected_within()
+        };
+        let scan = segment.thinned_with(&anchor.measured, within, &self.settings)?;
         let steps = segment.first.abs_diff(anchor.scan) as f64;
         let mut expected = RigidTransform::exp(anchor.motion.map(|component| -steps * component));
         expected.translation /= segment.scale.voxel;
@@ -211,7 +223,7 @@ impl Segments {
 /// Searches a scan in one of the past maps, in which it then goes on: its index, and the poses that are found.
 fn search_past(
     past: &mut [Segment],
-    points: &[[f64; 3]],
+    measured: &MeasuredScan,
     searched: usize,
     settings: &OdometrySettings,
 ) -> Option<(usize, Vec<FoundPose>)> {
@@ -221,7 +233,7 @@ fn search_past(
     let others = past.iter_mut().enumerate().filter(|(index, _)| *index != chosen);
     others.for_each(|(_, segment)| segment.tracker.skip());
     let segment = &mut past[chosen];
-    let scan = segment.thinned(points, settings);
+    let scan = segment.thinned(measured, settings);
     let steps = segment.follow(scan.as_ref());
     (!steps.is_empty()).then(|| (chosen, steps.iter().map(|step| segment.found(step)).collect()))
 }

@@ -142,6 +142,11 @@ pub struct ScanAlignmentSettings {
     pub rival_steps: usize,
     /// Steps point to plane once it is known which motions the map does not determine.
     pub constrained_steps: usize,
+    /// Steps point to plane that refine the pose and the motion within a scan at once, where times are known.
+    pub deskew_steps: usize,
+    /// Standard deviation, in voxels, of the twist within a scan that its pose and those before it tell, from scan to scan
+    /// and at the median range: small enough to count as much as thousands of points do.
+    pub deskew_deviation: f64,
     /// Correspondences without which there is no pose.
     pub min_correspondences: usize,
     /// Points of the map, at most, that are looked up in the scan's range image: their share needs no more.
@@ -165,6 +170,8 @@ impl Default for ScanAlignmentSettings {
             rival_radius: 8.0,
             rival_steps: 8,
             constrained_steps: 3,
+            deskew_steps: 3,
+            deskew_deviation: 0.01,
             min_correspondences: 30,
             free_space_samples: 8000,
         }
@@ -267,6 +274,13 @@ pub struct ExpectationSettings {
     pub departed_excess: f64,
     /// The excess of unexplained points up to which a scan at its expected pose is believed: something has come.
     pub arrived_excess: f64,
+    /// Distance between the expected and the found pose, in voxels at the median range, up to which more may have left
+    /// and come: a sensor that was carried away is not seen there by chance.
+    pub near: f64,
+    /// The excess in free space up to which a scan so near to its expected pose is believed, as where lorries pass.
+    pub departed_excess_near: f64,
+    /// The excess of unexplained points, likewise.
+    pub arrived_excess_near: f64,
 }
 
 impl Default for ExpectationSettings {
@@ -284,6 +298,9 @@ impl Default for ExpectationSettings {
             certain_unexplained: 0.02,
             departed_excess: 0.05,
             arrived_excess: 0.2,
+            near: 0.67,
+            departed_excess_near: 0.3,
+            arrived_excess_near: 0.4,
         }
     }
 }
@@ -309,7 +326,7 @@ pub struct SegmentSettings {
 
 impl Default for SegmentSettings {
     fn default() -> Self {
-        Self { scans_lost: 5, scans_unfit: 3, least_filled: 0.25, most_filled: 3.0, least_ratio: 1.5, max_kept: 8 }
+        Self { scans_lost: 5, scans_unfit: 3, least_filled: 0.25, most_filled: 2.0, least_ratio: 1.5, max_kept: 8 }
     }
 }
 
@@ -323,6 +340,12 @@ pub struct RelocalisationSettings {
     /// Keyframes that are searched for one scan, at most: the nearest to where the sensor was last, and as many others
     /// in turn, so that a search costs a few tracked scans.
     pub max_keyframes: usize,
+    /// Keyframes that are kept, at most: each takes some 300 kB.
+    pub max_kept: usize,
+    /// Scans after which a keyframe that is not in the map any more may be one that the sensor comes back to.
+    pub scans_apart: u32,
+    /// Distance, in median ranges, within which such a keyframe is looked for.
+    pub loop_distance: f64,
     /// Scans after a search before a pose is searched again that would be kept without.
     pub scans_between: usize,
     /// Step between the rotations about the sensor's axes that are tried at its last position, in radians: a point at
@@ -332,6 +355,9 @@ pub struct RelocalisationSettings {
     pub rotation_points: usize,
     /// Distance to the map, in voxels, within which such a point counts.
     pub rotation_distance: f64,
+    /// Share of these points by which more come near the map from another start than from where the motion leads, to be
+    /// preferred.
+    pub clear_gain: f64,
     /// Such rotations from which the scan is aligned, at most, the best first.
     pub rotation_trials: usize,
     /// Matches that agree with a pose that is tried, at least.
@@ -361,10 +387,14 @@ impl Default for RelocalisationSettings {
             keyframe_distance: 0.3,
             keyframe_rotation: 30.0_f64.to_radians(),
             max_keyframes: 16,
+            max_kept: 400,
+            scans_apart: 30,
+            loop_distance: 0.6,
             scans_between: 10,
             rotation_step: 8.0_f64.to_radians(),
             rotation_points: 300,
             rotation_distance: 1.5,
+            clear_gain: 0.1,
             rotation_trials: 2,
             min_matches: 24,
             max_trials: 3,

@@ -1,10 +1,14 @@
 //! Scan after scan: predicted, aligned with the map, and searched where that fails: by other motions, by rotations, and
 //! among keyframes.
 
+mod loops;
 mod relocalisation;
 
+pub(super) use loops::Loop;
+
+use super::deskewing::MotionWithin;
 use super::expectation::Expectation;
-use super::keyframes::Keyframes;
+use super::keyframes::{Keyframes, Which};
 use super::local_map::LocalMap;
 use super::pose_covariance::{Covariance, sum_of_alike};
 use super::result::ScanStatus;
@@ -16,7 +20,7 @@ use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
 use crate::alignment::{FreeDirection, orthonormal, unscaled};
 use crate::statistics::quantile;
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
 /// Share of a scan's points that the map's range is taken from.
 const MOST: f64 = 0.99;
@@ -36,6 +40,8 @@ pub(super) struct Step {
     pub free_directions: Vec<FreeDirection>,
     pub status: ScanStatus,
     pub overlap: f64,
+    /// From scan to scan, in the sensor's axes at the reference, where the times of points are known.
+    pub twist: Option<Vector6<f64>>,
 }
 
 /// Keeps the map, the motion and the keyframes; lengths are in voxels.
@@ -54,6 +60,10 @@ pub(super) struct Tracker {
     last: RigidTransform,
     /// From a scan to the next one.
     motion: RigidTransform,
+    /// Whether the last two scans have told it.
+    has_motion: bool,
+    /// The motion before, where the last three scans have told both.
+    motion_before: Option<Vector6<f64>>,
     /// Scans since the last one that has a pose.
     since: usize,
     /// Sum of the squared errors of predictions, and their number.
@@ -66,12 +76,16 @@ pub(super) struct Tracker {
     /// Whether the first of them is where the sensor was expected, and has only rotated.
     trial_is_there: bool,
     last_mapped: Option<RigidTransform>,
+    /// The first scan, until the second one shows how the sensor moved within it.
+    first: Option<ThinnedScan>,
     /// Scans since the last search.
     since_search: usize,
     /// Numbers of the scans up to the last one whose poses were kept though doubted.
     doubted: Vec<usize>,
     /// Numbers of the scans whose poses a later one has disproved, until they are asked for.
     disproved: Vec<usize>,
+    /// Loops that were closed, until they are asked for.
+    loops: Vec<Loop>,
     number: usize,
 }
 
@@ -90,6 +104,8 @@ impl Tracker {
             mapped: Vec::new(),
             last: RigidTransform::identity(),
             motion: RigidTransform::identity(),
+            has_motion: false,
+            motion_before: None,
             since: 1,
             squared_errors: (settings.prediction.first_error * median_range).powi(2),
             predictions: 1.0,
@@ -98,9 +114,11 @@ impl Tracker {
             trial: Vec::new(),
             trial_is_there: false,
             last_mapped: None,
+            first: None,
             since_search: usize::MAX,
             doubted: Vec::new(),
             disproved: Vec::new(),
+            loops: Vec::new(),
             number: 0,
         }
     }
@@ -151,6 +169,7 @@ impl Tracker {
     pub fn skip(&mut self) {
         self.number += 1;
         self.since += 1;
+        (self.has_motion, self.motion_before) = (false, None);
         if self.since > self.settings.prediction.max_lost {
             // Where the sensor went meanwhile, nobody knows.
             self.motion = RigidTransform::identity();
@@ -170,12 +189,15 @@ impl Tracker {
                 free_directions: Vec::new(),
                 status: ScanStatus::Tracked,
                 overlap: 1.0,
+                twist: None,
             };
-            return self.take(scan, first);
+            self.first = scan.motion.is_some().then(|| scan.clone());
+            return self.take(scan, &scan.points, first);
         }
         self.since_search = self.since_search.saturating_add(1);
-        let prediction = self.prediction();
+        let prediction = self.expected(scan);
         let first = self.aligned(scan, prediction);
+        let first = first.and_then(|found| self.deskew_first(scan, found));
         if std::env::var("SURFSIG_DEBUG").is_ok() {
             match &first {
                 Some(f) => eprintln!("DBG {} pts {} ov {:.2} known {:.2} free {:.3} unexpl {:.3} dev {:.3} err {:.2} reach {:.2} fd {} met {} bel {} lost {} trial {} exp {} mapsize {}", self.number, scan.points.len(), f.overlap, f.known, f.free_space, f.unexplained, f.deviation(self.median_range), self.prediction_error(&prediction, f), self.correspondence_distance(), f.free_directions.len(), self.is_met(f), self.is_believable(f), self.is_lost, self.trial.len(), self.is_expected(f, &prediction), self.map.len()),
@@ -197,6 +219,7 @@ impl Tracker {
             free_directions: found.free_directions.clone(),
             status,
             overlap: found.overlap,
+            twist: found.within.as_ref().map(|(twist, _)| *twist),
         };
         let was_expected = status == ScanStatus::Tracked && !self.is_lost;
         if !was_expected && self.stays_on_trial(&step, &found) {
@@ -211,7 +234,58 @@ impl Tracker {
         }
         self.remember_doubt(&step, &found);
         self.expectation.add(&found);
-        self.take(scan, step)
+        let mut step = step;
+        let mut found = found;
+        if was_expected && self.doubted.is_empty() && self.keyframes.is_new(&found.T_map_scan) {
+            if let Some(there) = self.closed_loop(scan, &found) {
+                step.T_map_scan = there.T_map_scan;
+                step.covariance = self.covariance(&there);
+                found = there;
+            }
+        }
+        let points = found.within.as_ref().map_or(&scan.points, |(_, points)| points);
+        self.take(scan, points, step)
+    }
+
+    /// Gives the loops that the last scan has closed.
+    pub fn take_loops(&mut self) -> Vec<Loop> {
+        std::mem::take(&mut self.loops)
+    }
+
+    /// The motion within the next scan, as it is expected.
+    pub fn expected_within(&self) -> MotionWithin {
+        let last = Vector6::from(self.motion.log());
+        // At the next scan's reference, by the twists at the middles between the last three.
+        let twist = self.motion_before.map_or(last, |before| last + 1.5 * (last - before));
+        MotionWithin {
+            times: Vec::new(),
+            twist,
+            since: (self.since == 1 && !self.mapped.is_empty() && !self.is_lost).then_some((
+                self.last,
+                self.has_motion.then_some(last),
+            )),
+            farthest: self.correspondence_distance(),
+            deviation: self.settings.alignment.deskew_deviation,
+            range: self.median_range.max(1.0),
+        }
+    }
+
+    /// Deskews the first scan by the motion that the second one has shown, and aligns that anew.
+    fn deskew_first(&mut self, scan: &ThinnedScan, found: ScanAlignment) -> Option<ScanAlignment> {
+        let Some(first) = self.first.take() else { return Some(found) };
+        let mut found = found;
+        for _ in 0..self.settings.alignment.deskew_steps {
+            // Both scans are bent nearly alike, so that the poses tell the motion.
+            let twist = Vector6::from(found.T_map_scan.log());
+            let first = first.deskewed_anew(twist, &self.settings)?;
+            let scan = scan.deskewed_anew(twist, &self.settings)?;
+            self.map = LocalMap::new(&self.settings.map);
+            self.map.add(first.points.iter().copied(), 0);
+            self.keyframes.remove(&[0]);
+            self.keyframes.offer(&first, &RigidTransform::identity(), 0);
+            found = self.aligned(&scan, found.T_map_scan)?;
+        }
+        Some(found)
     }
 
     fn is_met(&self, found: &ScanAlignment) -> bool {
@@ -257,7 +331,7 @@ impl Tracker {
         start: RigidTransform,
         distance: f64,
     ) -> Option<ScanAlignment> {
-        let known = |pose: &RigidTransform| self.keyframes.would_have_seen(pose);
+        let known = |pose: &RigidTransform| self.keyframes.would_have_seen(pose, Which::Loaded);
         align(scan, &self.map, start, distance, &self.settings.alignment, known)
     }
 
@@ -290,9 +364,11 @@ impl Tracker {
     /// Whether a doubted pose may be kept: it is near where the sensor was expected, which long after it was lost is
     /// nowhere.
     fn is_expected(&self, found: &ScanAlignment, prediction: &RigidTransform) -> bool {
-        let near = self.prediction_error(prediction, found) <= self.correspondence_distance();
+        let error = self.prediction_error(prediction, found);
         let goes_on = !self.is_lost || self.since <= self.settings.prediction.max_lost;
-        near && goes_on && self.expectation.may_be_new(found)
+        // While it is lost, the motion says less.
+        let distance = error * self.since as f64;
+        error <= self.correspondence_distance() && goes_on && self.expectation.may_be_new(found, distance)
     }
 
     /// Keeps back poses in a known part of the map until one is certain or enough have followed each other: parts that
@@ -341,7 +417,7 @@ impl Tracker {
     }
 
     /// Puts a scan into the map, and gives its step after those that it confirms.
-    fn take(&mut self, scan: &ThinnedScan, step: Step) -> Vec<Step> {
+    fn take(&mut self, scan: &ThinnedScan, points: &[[f64; 3]], step: Step) -> Vec<Step> {
         self.go_on(&step);
         let pose = step.T_map_scan;
         let steps = if self.trial.is_empty() { vec![step] } else { std::mem::take(&mut self.trial) };
@@ -357,7 +433,7 @@ impl Tracker {
         // First of all what leaves: new points need no normals that are made with it.
         self.map.keep_within(pose.translation.into(), self.map_range);
         let is_near = |point: &&[f64; 3]| Vector3::from(**point).norm() <= self.map_range;
-        let near = scan.points.iter().filter(is_near).map(|point| pose.transform_point(*point));
+        let near = points.iter().filter(is_near).map(|point| pose.transform_point(*point));
         self.map.add(near, number);
         self.mapped.resize(step.number + 1, None);
         self.mapped[step.number] = Some((pose, step.covariance));
@@ -372,9 +448,12 @@ impl Tracker {
         // A sensor that was found again far off has been carried there, which it does not go on to be.
         let is_carried = step.status == ScanStatus::Relocalised
             && moved.translation.norm() > self.correspondence_distance() + self.motion.translation.norm();
+        self.motion_before = None;
         if is_carried {
             self.motion = RigidTransform::identity();
         } else if self.since == 1 {
+            self.motion_before = self.has_motion.then(|| Vector6::from(self.motion.log()));
+            self.has_motion = self.number > 0;
             self.motion = moved;
         }
         self.last = step.T_map_scan;

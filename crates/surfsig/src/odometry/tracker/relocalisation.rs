@@ -2,14 +2,14 @@
 
 use super::super::local_map::LocalMap;
 use super::super::result::ScanStatus;
-use super::super::rotation_search::rotations_on_map;
+use super::super::rotation_search::{points_near, rotations_on_map, some_points};
 use super::super::scan_alignment::ScanAlignment;
 use super::super::thinned_scan::ThinnedScan;
 use super::Tracker;
 use crate::RigidTransform;
 
 impl Tracker {
-    /// The pose found from other starts, by rotations of the sensor or among keyframes, or else the doubted one where it
+    /// The pose found by rotations of the sensor or among keyframes, or else the doubted one where it
     /// may be kept.
     pub(super) fn found_elsewhere_or_doubted(
         &mut self,
@@ -17,9 +17,6 @@ impl Tracker {
         doubted: Option<ScanAlignment>,
         prediction: &RigidTransform,
     ) -> Option<(ScanAlignment, ScanStatus)> {
-        if let Some(found) = self.by_another_motion(scan, prediction) {
-            return Some((found, ScanStatus::Tracked));
-        }
         let kept = doubted.as_ref().filter(|found| self.is_expected(found, prediction));
         // A search costs several scans, and changes next to nothing where a pose is only doubted.
         if kept.is_none() || self.since_search >= self.settings.relocalisation.scans_between {
@@ -37,16 +34,22 @@ impl Tracker {
         doubted.filter(|found| self.is_expected(found, prediction)).map(|found| (found, ScanStatus::Tracked))
     }
 
-    /// From where the sensor was, and from there back by its last motion: one that is shaken comes back.
-    fn by_another_motion(&self, scan: &ThinnedScan, prediction: &RigidTransform) -> Option<ScanAlignment> {
+    /// Where the scan is aligned from: where its motion leads; or where it was, or from there back by its last motion,
+    /// as one that is shaken comes back, if it clearly lies better on the map there.
+    pub(super) fn expected(&self, scan: &ThinnedScan) -> RigidTransform {
+        let settings = &self.settings.relocalisation;
+        let prediction = self.prediction();
+        let points = some_points(scan.coarse.points(), settings.rotation_points);
+        let near = |pose: &RigidTransform| points_near(&points, &self.map, pose, settings.rotation_distance) as f64;
+        let mut best = (prediction, near(&prediction) + settings.clear_gain * points.len() as f64);
         let least = self.settings.prediction.min_correspondence_distance;
-        let starts = [self.last, self.last * self.motion.inverse()];
-        let others = starts.into_iter().filter(|start| {
-            self.distance_at_range(&(prediction.inverse() * *start)) > least
-        });
-        others.filter_map(|start| self.aligned(scan, start)).find(|found| {
-            found.free_directions.is_empty() && self.is_met(found)
-        })
+        for start in [self.last, self.last * self.motion.inverse()] {
+            if self.distance_at_range(&(prediction.inverse() * start)) > least {
+                let count = near(&start);
+                best = if count > best.1 { (start, count) } else { best };
+            }
+        }
+        best.0
     }
 
     /// From where the sensor is expected, rotated about itself.
