@@ -59,7 +59,7 @@ def main() -> None:
 
 
 def trajectory(speed: float, rate: float, seed: int) -> tuple[CubicSpline, CubicSpline]:
-    """Give position and angles (yaw, pitch, roll) over the seconds: from rest, with yaw rates up to `rate`."""
+    """Give position and angles (yaw, pitch, roll) over the seconds: from rest, rates up to `rate`."""
     rng = np.random.default_rng([81, seed])
     knots = np.arange(0.0, 60.0, 1.0)
     # The vehicle keeps to its street, and the sensor looks to and fro with a period of four seconds.

@@ -166,6 +166,7 @@ def test_an_odometry_s_page_holds_the_trajectory_and_the_map(tmp_path: Path) -> 
         0.1,
         np.where(status == 2, -1, 0),
         np.full((3, 6), np.nan),
+        [],
     )
     scans = [surfsig.PointCloud(RNG.uniform(size=(60, 3))) for _ in range(3)]
     found.write_report(tmp_path / "page.html", scans)

@@ -51,7 +51,15 @@ from surfsig.files import (
 from surfsig.finding import Instance, Instances, Library, LibraryEntry, find_instances
 from surfsig.flat_atom import flat_atom_length
 from surfsig.missing_returns import remove_missing_returns
-from surfsig.odometry import Odometry, ScanStatus, TrackedScan, Tracker, deskew, estimate_odometry
+from surfsig.odometry import (
+    LoopClosure,
+    Odometry,
+    ScanStatus,
+    TrackedScan,
+    Tracker,
+    deskew,
+    estimate_odometry,
+)
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import EqualSurfaces, Piece, Recurrence, Recurrences, find_recurrences
 from surfsig.registration import (
@@ -119,6 +127,7 @@ __all__ = [
     "InvalidInputError",
     "Library",
     "LibraryEntry",
+    "LoopClosure",
     "MultiwayRegistration",
     "Odometry",
     "OdometrySettings",
@@ -154,8 +163,8 @@ __all__ = [
     "Trajectory",
     "__version__",
     "crop",
-    "downsample",
     "deskew",
+    "downsample",
     "estimate_odometry",
     "extract",
     "extract_field_signatures",

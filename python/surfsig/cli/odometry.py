@@ -42,7 +42,15 @@ if TYPE_CHECKING:
     "--spin-rate",
     type=float,
     metavar="HZ",
-    help="Of a lidar that spins while it moves, where points have no times; negative if clockwise from above.",
+    help="Of a lidar that spins while it moves, where points have no times; negative if clockwise.",
+)
+@click.option("--no-loops", is_flag=True, help="Leave the trajectory as it is where the sensor comes back.")
+@click.option(
+    "--map",
+    "map_file",
+    type=CLOUD,
+    metavar="FILE",
+    help="Write what all scans saw: a point per voxel, its normal, and by how many scans it was seen.",
 )
 @click.option(
     "--deskewed",
@@ -67,6 +75,8 @@ def odometry_command(
     distance: float | None,
     map_range: float | None,
     spin_rate: float | None,
+    no_loops: bool,
+    map_file: Path | None,
     deskewed: Path | None,
     report: Path | None,
     threads: int | None,
@@ -93,7 +103,7 @@ def odometry_command(
     from surfsig.files import trajectory_format
     from surfsig.files.atomic import check_target
 
-    for target in (output, covariances, report):
+    for target in (output, covariances, map_file, report):
         if target is not None:
             check_target(target)
     shown = on_terminal() and not quiet
@@ -106,6 +116,7 @@ def odometry_command(
             distance=distance,
             map_range=map_range,
             spin_rate=spin_rate,
+            close_loops=not no_loops,
             threads=threads,
             progress=progress,
         )
@@ -122,12 +133,14 @@ def odometry_command(
         beside = output.with_name(f"{output.stem}.segment{segment}{output.suffix}")
         surfsig.write_trajectory(beside, found.poses_of(segment), found.timestamps, format=chosen)
         warnings.warn(
-            f"{int((found.segments == segment).sum())} scans are in another map, whose relation to the first is "
-            f"not known: {beside}",
+            f"{int((found.segments == segment).sum())} scans are in another map, whose relation to the "
+            f"first is not known: {beside}",
             stacklevel=1,
         )
     if covariances is not None:
         surfsig.write_covariances(covariances, found.covariances)
+    if map_file is not None:
+        surfsig.write(map_file, found.map((scan.cloud for scan in sequence), spin_rate=spin_rate))
     if deskewed is not None:
         _write_deskewed(deskewed, sequence, found, spin_rate)
     if report is not None:
@@ -141,6 +154,7 @@ def odometry_command(
             "scans": len(found),
             **counts,
             "segments": 1 + len(others),
+            "loops": len(found.loops),
         }
         print_json({**values, "length": found.length, "voxel": found.voxel})
     elif shown:
@@ -162,7 +176,7 @@ def _write_deskewed(folder: Path, sequence: ScanSequence, found: Odometry, spin_
         )
     folder.mkdir(parents=True, exist_ok=True)
     digits = len(str(len(found)))
-    for number, scan in enumerate(sequence):
-        timestamp = None if scan.timestamp == number else scan.timestamp
-        cloud = surfsig.deskew(scan.cloud, found.twists[number], timestamp=timestamp, spin_rate=spin_rate)
-        surfsig.write(folder / f"{number:0{digits}d}.ply", cloud)
+    for index, scan in enumerate(sequence):
+        timestamp = None if scan.timestamp == index else scan.timestamp
+        cloud = surfsig.deskew(scan.cloud, found.twists[index], timestamp=timestamp, spin_rate=spin_rate)
+        surfsig.write(folder / f"{index:0{digits}d}.ply", cloud)

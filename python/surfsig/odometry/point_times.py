@@ -1,4 +1,4 @@
-"""When each point of a scan was measured: from a field of the file, or from the angle of a spinning sensor."""
+"""When each point of a scan was measured: from a field of the file, or the angle of a spinning sensor."""
 
 from __future__ import annotations
 

@@ -33,6 +33,7 @@ def estimate_odometry(
     distance: float | None = None,
     map_range: float | None = None,
     spin_rate: float | None = None,
+    close_loops: bool = True,
     settings: OdometrySettings | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
@@ -43,11 +44,12 @@ def estimate_odometry(
     the last motion leads. Where it lies there worse than scans did of late, it is searched among keyframes by
     the signatures of its keypoints; a pose that is found so counts only if the map explains all of the scan,
     or the next scans follow it. Where the map leaves a motion open, as along a smooth corridor, that is named
-    (`Odometry.free_directions`), its variance is infinite, and the last motion goes on in it. Where the sensor
+    (`Odometry.free_directions`), its variance is infinite, and the last motion goes on in it. Where the
+    sensor
     stays lost, another map is begun (`Odometry.segments`). Where points have times (fields `t`, `time`,
-    `timestamp`, `offset_time`, `gps_time`, or `spin_rate`), the motion within each scan is found with its pose,
-    and taken out. Nothing needs to be set, and the result is always the same. `Tracker` takes the scans one by
-    one.
+    `timestamp`, `offset_time`, `gps_time`, or `spin_rate`), the motion within each scan is found with its
+    pose, and taken out. Nothing needs to be set, and the result is always the same. `Tracker` takes the scans
+    one by one.
 
     Parameters
     ----------
@@ -66,9 +68,13 @@ def estimate_odometry(
         Distance from the sensor up to which the map is kept, in the scans' unit; by default 1.2 times the
         distance within which 99 in 100 points of a scan are.
     spin_rate
-        Rotations a second of a lidar that spins while it moves, where its points have no times: counter-clockwise
-        about z, or negative if it spins clockwise. A scan begins and ends behind, at -x, and its pose is that at
-        its middle.
+        Rotations a second of a lidar that spins while it moves, where its points have no times:
+        counter-clockwise
+        about z, or negative if it spins clockwise. A scan begins and ends behind, at -x, and its pose is
+        that at its middle.
+    close_loops
+        Whether what the sensor has drifted by when it comes back to where it was is distributed over the way
+        between (`Odometry.loops`).
     settings
         For experts; `OdometrySettings` describes what may be changed.
     threads
@@ -96,7 +102,6 @@ def estimate_odometry(
         If a file cannot be read, which then counts as a scan without points, a bag ends too early, or missing
         returns at (0, 0, 0) are left out.
     """
-
     tracker = Tracker(
         voxel=voxel,
         distance=distance,
@@ -119,11 +124,11 @@ def estimate_odometry(
         raise InvalidInputError("there are no scans")
     if tracker.missing_returns:
         warnings.warn(
-            f"{tracker.missing_returns} points of {len(tracker)} scans are at (0, 0, 0), where a lidar's missing "
-            "returns are written; they are left out",
+            f"{tracker.missing_returns} points of {len(tracker)} scans are at (0, 0, 0), where a lidar's "
+            "missing returns are written; they are left out",
             stacklevel=2,
         )
-    return tracker.result()
+    return tracker.result(close_loops=close_loops)
 
 
 def _timed(scans: Any) -> Iterator[TimedScan]:

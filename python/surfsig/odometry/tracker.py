@@ -13,6 +13,7 @@ from surfsig.alignment.free_directions import FreeDirection, free_direction
 from surfsig.arguments import positive_length, thread_count
 from surfsig.errors import InvalidInputError
 from surfsig.missing_returns import missing_returns
+from surfsig.odometry.loop_closing import LoopClosure, closed
 from surfsig.odometry.point_times import PointTimes, point_times
 from surfsig.odometry.result import Odometry, ScanStatus
 from surfsig.point_cloud import PointCloud
@@ -21,6 +22,8 @@ Array = NDArray[np.float64]
 
 _LONGEST = 20.0
 """Durations of a scan between two references, at most, if the second scan follows the first."""
+_REACH = 30.0
+"""Voxels by which a scan sees, about: by this length rotations count where loops close."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,8 +130,8 @@ class Tracker:
         Parameters
         ----------
         scan
-            In its sensor's frame: what `PointCloud.of` takes. Points at (0, 0, 0) are missing returns, and left
-            out.
+            In its sensor's frame: what `PointCloud.of` takes. Points at (0, 0, 0) are missing returns, and
+            left out.
         timestamp
             In seconds; the scan's number by default.
         times
@@ -184,7 +187,7 @@ class Tracker:
         )
 
     def _interval(self, found: PointTimes | None, timestamp: float | None) -> float:
-        """Give the seconds since the scan before, if its points have times; a spinning sensor scans all along."""
+        """Give the seconds since the scan before, if points have times; a spinning sensor scans all along."""
         if found is None:
             return float("nan")
         reference = timestamp if found.reference is None else found.reference
@@ -195,20 +198,35 @@ class Tracker:
                 return since
         return found.duration
 
-    def result(self) -> Odometry:
+    def result(self, *, close_loops: bool = True) -> Odometry:
         """Give the trajectory so far.
+
+        Parameters
+        ----------
+        close_loops
+            Whether what the sensor had drifted by when it came back is distributed over the way between.
+            Otherwise poses are those that `push` gave.
 
         Returns
         -------
         Odometry
         """
+        loops = [
+            LoopClosure(scan, earlier, np.array(by_earlier), np.array(before))
+            for scan, earlier, by_earlier, before in self._odometry.loops()
+        ]
         arrays = self._odometry.arrays()
         free = [[free_direction(*one) for one in every] for every in arrays.pop("free_directions")]
         twists = arrays.pop("twists") / np.array(self._intervals, np.float64).reshape(-1, 1)
+        voxel = np.nan if self._odometry.voxel is None else self._odometry.voxel
+        if close_loops and loops:
+            # Voxels are such that a scan fills some thousand: it sees some thirty of them far.
+            arrays["poses"] = closed(arrays["poses"], arrays["segments"], loops, _REACH * voxel)
         return Odometry(
             **arrays,
+            loops=loops,
             twists=twists,
             free_directions=free,
             timestamps=np.array(self._timestamps, np.float64),
-            voxel=np.nan if self._odometry.voxel is None else self._odometry.voxel,
+            voxel=voxel,
         )

@@ -229,8 +229,8 @@ def scan_moving(
     Returns
     -------
     PointCloud
-        Each point in the sensor's axes at its own time, float32, with the viewpoint at (0, 0, 0) and the field
-        ``time``: seconds from the middle of the scan on, float32.
+        Each point in the sensor's axes at its own time, float32, with the viewpoint at (0, 0, 0) and the
+        field ``time``: seconds from the middle of the scan on, float32.
 
     Raises
     ------
