@@ -81,9 +81,11 @@ def test_sight_that_opens_is_no_reason_to_be_lost() -> None:
         ((-10.3, 1.2, 0.5), (0.6, 0.5, 1.0)),
     ]
     placed = [simulate.Placed(simulate.Box(size), simulate.pose(middle)) for middle, size in walls]
-    hall = simulate.hall(5, size=(26.0, 16.0, 6.0))
+    hall = simulate.hall(5, size=(26.0, 16.0, 6.0)).objects
+    # The shell has six parts, whose middles are on the way; nothing else may stand there.
+    free = [*hall[:6], *(one for one in hall[6:] if abs(one.pose[1, 3]) > 3.5)]
     true = along(12, 0.4, -10.0)
-    found = surfsig.estimate_odometry(scanned(simulate.Scene([*hall.objects, *placed]), true))
+    found = surfsig.estimate_odometry(scanned(simulate.Scene([*free, *placed]), true))
     assert found.counts()["tracked"] == 12
     assert (found.segments == 0).all()
     assert largest_error(found, true) < 0.05

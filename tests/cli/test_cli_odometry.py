@@ -116,6 +116,7 @@ def test_ctrl_c_leaves_the_old_file(
 
 def test_scans_are_written_without_the_motion_within_them_and_fused(tmp_path: Path, shell: Shell) -> None:
     scans, _ = moving_scans(5)
+    (tmp_path / "scans").mkdir()
     for number, cloud in enumerate(scans):
         surfsig.write(tmp_path / "scans" / f"{number}.ply", cloud)
     done = shell(

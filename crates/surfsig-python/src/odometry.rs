@@ -51,6 +51,9 @@ settings_class! {
     }
 }
 
+/// The scan, the earlier one, T_earlier_scan, and the scan's pose by the way around.
+type LoopInPython = (usize, usize, [[f64; 4]; 4], [[f64; 4]; 4]);
+
 /// Follows a sensor from scan to scan; see the crate's `Odometry`.
 #[pyclass(module = "surfsig._surfsig")]
 pub struct Odometry {
@@ -107,7 +110,7 @@ impl Odometry {
     }
 
     /// Loops: the scan, the earlier one, T_earlier_scan, and the scan's pose by the way around.
-    fn loops(&self) -> Vec<(usize, usize, [[f64; 4]; 4], [[f64; 4]; 4])> {
+    fn loops(&self) -> Vec<LoopInPython> {
         let found = self.odometry.loops().iter();
         let told = |one: &surfsig::LoopClosure| {
             (one.scan, one.earlier, one.T_earlier_scan.to_matrix(), one.T_map_scan_before.to_matrix())
@@ -127,8 +130,10 @@ impl Odometry {
         let poses: Vec<f64> = found.iter().flat_map(matrix).flatten().collect();
         let covariances: Vec<f64> = found.iter().flat_map(|pose| pose.covariance).flatten().collect();
         let status: Vec<u8> = found.iter().map(|pose| pose.status as u8).collect();
-        let segments: Vec<i64> =
-            found.iter().map(|pose| if pose.T_map_scan.is_some() { pose.segment as i64 } else { -1 }).collect();
+        let segments: Vec<i64> = found
+            .iter()
+            .map(|pose| if pose.T_map_scan.is_some() { pose.segment as i64 } else { -1 })
+            .collect();
         let overlaps: Vec<f64> = found.iter().map(|pose| pose.overlap).collect();
         let arrays = PyDict::new(py);
         arrays.set_item("poses", poses.into_pyarray(py).reshape([found.len(), 4, 4])?)?;

@@ -101,8 +101,8 @@ pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use monitor::Monitor;
 pub use neighbor_distances::mean_neighbor_distances;
 pub use odometry::{
-    ExpectationSettings, LoopClosure, MapSettings, Odometry, OdometrySettings, PredictionSettings, RelocalisationSettings,
-    ScaleSettings, ScanAlignmentSettings, ScanPose, ScanStatus, SegmentSettings,
+    ExpectationSettings, LoopClosure, MapSettings, Odometry, OdometrySettings, PredictionSettings,
+    RelocalisationSettings, ScaleSettings, ScanAlignmentSettings, ScanPose, ScanStatus, SegmentSettings,
 };
 pub use orientation::consistent_directions;
 pub use point_cloud::{Offsets, PointCloud, Radius};

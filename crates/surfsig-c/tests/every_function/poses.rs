@@ -88,7 +88,8 @@ pub fn odometries(called: &mut Called) {
     call!(called, surfsig_odometry_push_timed(None, null(), null(), pose) gives INVALID);
     for (cloud, points) in clouds.iter().zip(odd_clouds()) {
         let scan = surfsig_scan { cloud: cloud.0, viewpoint: null(), directions: null() };
-        let times: Vec<f64> = (0..points.len()).map(|k| if k % 7 == 3 { f64::NAN } else { k as f64 * 1e-3 }).collect();
+        let times: Vec<f64> =
+            (0..points.len()).map(|k| if k % 7 == 3 { f64::NAN } else { k as f64 * 1e-3 }).collect();
         if !points.is_empty() {
             call!(called, surfsig_odometry_push_timed(unsafe { made.as_mut() }, &scan, null(), pose) gives INVALID);
         }

@@ -53,9 +53,9 @@ impl MotionWithin {
 
 /// Points about the sensor at the reference: p = exp(t m) q, with the twist m and each point's time t.
 pub(super) fn deskewed(points: &[[f64; 3]], times: &[f64], twist: &Vector6<f64>) -> Vec<[f64; 3]> {
-    let (first, last) = times.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), time| {
-        (low.min(*time), high.max(*time))
-    });
+    let (first, last) = times
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), time| (low.min(*time), high.max(*time)));
     let step = (last - first) / TRANSFORMS as f64;
     let at = |number: usize| first + step * number as f64;
     let transforms: Vec<RigidTransform> =
@@ -115,7 +115,9 @@ pub(super) fn joint_step(
         normal[(k, k)] += DAMPING * normal[(k, k)].max(f64::MIN_POSITIVE);
     }
     let step = -normal.cholesky()?.solve(&gradient);
-    step.iter().all(|x| x.is_finite()).then(|| (step.fixed_rows::<6>(0).into(), step.fixed_rows::<6>(6).into()))
+    step.iter()
+        .all(|x| x.is_finite())
+        .then(|| (step.fixed_rows::<6>(0).into(), step.fixed_rows::<6>(6).into()))
 }
 
 #[cfg(test)]
@@ -142,8 +144,8 @@ mod tests {
             Vector6::new(0.01, -0.02, 0.005, 0.1, 0.2, -0.1),
             Vector6::new(-0.03, 0.01, 0.02, 0.3, -0.1, 0.2),
         );
-        let draw = |i: usize, k: usize| 2.0 * uniform(i, k) - 1.0;
-        let design: Vec<[f64; 6]> = (0..500).map(|i| std::array::from_fn(|k| draw(i, k))).collect();
+        let draw = |i: usize, k: u64| 2.0 * uniform(i, k) - 1.0;
+        let design: Vec<[f64; 6]> = (0..500).map(|i| std::array::from_fn(|k| draw(i, k as u64))).collect();
         let times: Vec<f64> = (0..500).map(|i| draw(i, 7) / 2.0).collect();
         let residual = |(row, time): (&[f64; 6], &f64)| -Vector6::from(*row).dot(&(x + y * *time));
         let residuals: Vec<f64> = design.iter().zip(&times).map(residual).collect();

@@ -21,7 +21,13 @@ pub(super) struct Expectation {
 impl Expectation {
     pub fn new(settings: &ExpectationSettings) -> Self {
         let none = VecDeque::new;
-        Self { settings: settings.clone(), overlaps: none(), known: none(), free_space: none(), unexplained: none() }
+        Self {
+            settings: settings.clone(),
+            overlaps: none(),
+            known: none(),
+            free_space: none(),
+            unexplained: none(),
+        }
     }
 
     /// Takes a scan that has a pose.

@@ -9,8 +9,8 @@ use super::voxel_index::squared_distance;
 use crate::alignment::{ConsensusSettings, Correspondences};
 use crate::field::{KeypointOptions, keypoints_within, match_fields};
 use crate::visibility::SphericalRangeImage;
-use std::collections::BTreeSet;
 use crate::{FieldOptions, FieldPlaces, Monitor, PointCloud, Radius, RigidTransform};
+use std::collections::BTreeSet;
 
 /// A scan that is kept; lengths are in voxels.
 #[allow(non_snake_case)]
@@ -119,7 +119,8 @@ impl Keyframes {
     }
 
     fn drop_one(&mut self) {
-        let distance = |a: &Keyframe, b: &Keyframe| (a.T_map_scan.translation - b.T_map_scan.translation).norm();
+        let distance =
+            |a: &Keyframe, b: &Keyframe| (a.T_map_scan.translation - b.T_map_scan.translation).norm();
         let gap = |index: usize| {
             let others = self.kept.iter().enumerate().filter(|(other, _)| *other != index);
             others.map(|(_, other)| distance(&self.kept[index], other)).fold(f64::INFINITY, f64::min)

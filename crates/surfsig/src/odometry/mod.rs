@@ -100,7 +100,14 @@ impl Odometry {
         settings.check()?;
         let segments = Segments::new(&settings);
         let sensor_position = SensorPosition::default();
-        Ok(Self { settings, sensor_position, sensors: Vec::new(), poses: Vec::new(), segments, loops: Vec::new() })
+        Ok(Self {
+            settings,
+            sensor_position,
+            sensors: Vec::new(),
+            poses: Vec::new(),
+            segments,
+            loops: Vec::new(),
+        })
     }
 
     /// Takes the next scan, in its own frame, in which the sensor is at the viewpoint, or at 0 where none is given.

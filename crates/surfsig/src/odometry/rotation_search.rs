@@ -42,7 +42,8 @@ pub(super) fn rotations_on_map(
         let beside = |by: usize| counts[axis * steps + (step + by) % steps];
         counts[number] >= beside(1) && counts[number] >= beside(steps - 1)
     };
-    let mut peaks: Vec<&(usize, RigidTransform)> = tried.iter().filter(|(number, _)| is_peak(*number)).collect();
+    let mut peaks: Vec<&(usize, RigidTransform)> =
+        tried.iter().filter(|(number, _)| is_peak(*number)).collect();
     peaks.sort_by_key(|(number, _)| std::cmp::Reverse(counts[*number]));
     peaks.into_iter().take(settings.rotation_trials).map(|(_, pose)| *pose).collect()
 }
@@ -53,7 +54,12 @@ pub(super) fn some_points(points: &[[f64; 3]], count: usize) -> Vec<[f64; 3]> {
 }
 
 /// How many points of a scan at a pose come near the map.
-pub(super) fn points_near(points: &[[f64; 3]], map: &LocalMap, pose: &RigidTransform, distance: f64) -> usize {
+pub(super) fn points_near(
+    points: &[[f64; 3]],
+    map: &LocalMap,
+    pose: &RigidTransform,
+    distance: f64,
+) -> usize {
     points.iter().filter(|point| map.nearest(pose.transform_point(**point), distance).is_some()).count()
 }
 

@@ -325,10 +325,8 @@ impl PointToPlane {
         settings: &ScanAlignmentSettings,
     ) -> Vec<FreeDirection> {
         let rivals_settings = settings.rivals;
-        let some: Vec<[f64; 3]> = some_of(scan.len(), rivals_settings.points)
-            .into_iter()
-            .map(|number| scan[number])
-            .collect();
+        let some: Vec<[f64; 3]> =
+            some_of(scan.len(), rivals_settings.points).into_iter().map(|number| scan[number]).collect();
         let rivals = Rivals {
             surface: MapSurface::new(map, self.limit, settings),
             source: &some,

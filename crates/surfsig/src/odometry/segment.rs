@@ -65,9 +65,10 @@ impl Segment {
         let is_near = |point: &[f64; 3]| point.iter().all(|c| c.abs() * per_voxel < FARTHEST);
         let near: Vec<bool> = scan.points.iter().map(is_near).collect();
         let points = scan.points.iter().zip(&near).filter(|(_, near)| **near);
-        let times = scan.times.as_ref().map(|times| {
-            times.iter().zip(&near).filter(|(_, near)| **near).map(|(time, _)| *time).collect()
-        });
+        let times = scan
+            .times
+            .as_ref()
+            .map(|times| times.iter().zip(&near).filter(|(_, near)| **near).map(|(time, _)| *time).collect());
         let points = points.map(|(point, _)| point.map(|c| c * per_voxel)).collect();
         let scan = ThinnedScan::new(MeasuredScan { points, times }, within, settings);
         // A sparse scan has voxels for a share of its points.

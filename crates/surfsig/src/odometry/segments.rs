@@ -164,7 +164,8 @@ impl Segments {
         if self.candidate.is_none() {
             let mut segment = Segment::new(self.worlds, number, &measured.points, &self.settings);
             let ratio = self.voxel().map_or(f64::INFINITY, |voxel| (segment.scale.voxel / voxel).ln().abs());
-            if needed == self.settings.segments.scans_unfit && ratio < self.settings.segments.least_ratio.ln() {
+            if needed == self.settings.segments.scans_unfit && ratio < self.settings.segments.least_ratio.ln()
+            {
                 return;
             }
             let scan = segment.thinned(measured, &self.settings);
@@ -210,11 +211,8 @@ impl Segments {
         let found = segment.tracker.located(&scan, &[expected, RigidTransform::identity()])?;
         let mut transform = found.T_map_scan;
         transform.translation *= segment.scale.voxel;
-        let of_pose = Covariance {
-            random: found.covariance,
-            systematic: found.systematic,
-            ..Covariance::zeros()
-        };
+        let of_pose =
+            Covariance { random: found.covariance, systematic: found.systematic, ..Covariance::zeros() };
         let both = anchor.covariance.and(&of_pose.scaled(segment.scale.voxel));
         Some((transform, both.carried(&transform)))
     }

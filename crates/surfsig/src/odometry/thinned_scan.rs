@@ -92,8 +92,7 @@ impl SensorPosition {
         let offsets = cloud.with_origin([0.0; 3]);
         let is_known = |point: &[f64; 3]| point.iter().all(|c| c.abs() < FARTHEST);
         let known = |index: usize| offsets.position(index).filter(is_known).map(|point| (index, point));
-        let (numbers, mut points): (Vec<usize>, Vec<[f64; 3]>) =
-            (0..cloud.len()).filter_map(known).unzip();
+        let (numbers, mut points): (Vec<usize>, Vec<[f64; 3]>) = (0..cloud.len()).filter_map(known).unzip();
         let times = times.map(|times| numbers.iter().map(|number| times[*number]).collect());
         let from = |sensor: [f64; 3]| [0, 1, 2].map(|k| cloud.origin[k] - sensor[k]);
         if self.substitute.is_none() && !points.is_empty() {

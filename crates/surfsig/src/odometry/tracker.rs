@@ -2,25 +2,25 @@
 //! among keyframes.
 
 mod loops;
+mod mapping;
+mod motion_within;
 mod relocalisation;
 
 pub(super) use loops::Loop;
 
-use super::deskewing::MotionWithin;
 use super::expectation::Expectation;
 use super::keyframes::{Keyframes, Which};
 use super::local_map::LocalMap;
-use super::pose_covariance::{Covariance, sum_of_alike};
+use super::pose_covariance::Covariance;
 use super::result::ScanStatus;
-use super::rotation_search::rotations_on_map;
 use super::scale::{Scale, distances};
 use super::scan_alignment::{ScanAlignment, align};
 use super::settings::OdometrySettings;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
-use crate::alignment::{FreeDirection, orthonormal, unscaled};
+use crate::alignment::FreeDirection;
 use crate::statistics::quantile;
-use nalgebra::{Vector3, Vector6};
+use nalgebra::Vector6;
 
 /// Share of a scan's points that the map's range is taken from.
 const MOST: f64 = 0.99;
@@ -145,21 +145,6 @@ impl Tracker {
         std::mem::take(&mut self.disproved)
     }
 
-    /// The pose of another scan near one of several starts, or where it lies best if it is rotated about the first, if
-    /// the map alone leaves no doubt of it.
-    pub fn located(&self, scan: &ThinnedScan, starts: &[RigidTransform]) -> Option<ScanAlignment> {
-        let settings = &self.settings.relocalisation;
-        let distance = self.correspondence_distance().max(settings.max_correspondence_distance);
-        let rotated = starts.first().into_iter().flat_map(|around| {
-            rotations_on_map(scan.coarse.points(), &self.map, around, settings)
-        });
-        let found = starts.iter().copied().chain(rotated);
-        found
-            .filter_map(|start| self.aligned_within(scan, start, distance))
-            .filter(|found| found.free_directions.is_empty() && self.is_met(found))
-            .max_by(|a, b| a.overlap.total_cmp(&b.overlap))
-    }
-
     /// From a scan to the next one, in voxels.
     pub fn motion(&self) -> RigidTransform {
         self.motion
@@ -198,21 +183,15 @@ impl Tracker {
         let prediction = self.expected(scan);
         let first = self.aligned(scan, prediction);
         let first = first.and_then(|found| self.deskew_first(scan, found));
-        if std::env::var("SURFSIG_DEBUG").is_ok() {
-            match &first {
-                Some(f) => eprintln!("DBG {} pts {} ov {:.2} known {:.2} free {:.3} unexpl {:.3} dev {:.3} err {:.2} reach {:.2} fd {} met {} bel {} lost {} trial {} exp {} mapsize {}", self.number, scan.points.len(), f.overlap, f.known, f.free_space, f.unexplained, f.deviation(self.median_range), self.prediction_error(&prediction, f), self.correspondence_distance(), f.free_directions.len(), self.is_met(f), self.is_believable(f), self.is_lost, self.trial.len(), self.is_expected(f, &prediction), self.map.len()),
-                None => eprintln!("DBG {} none lost {} trial {}", self.number, self.is_lost, self.trial.len()),
-            }
-        }
         let chosen = match first {
             Some(found) if self.is_met(&found) => Some((found, ScanStatus::Tracked)),
             doubted => self.found_elsewhere_or_doubted(scan, doubted, &prediction),
         };
-        let Some((found, status)) = chosen.filter(|(found, _)| self.is_believable(found)) else {
+        let Some((mut found, status)) = chosen.filter(|(found, _)| self.is_believable(found)) else {
             self.lose();
             return Vec::new();
         };
-        let step = Step {
+        let mut step = Step {
             number: self.number,
             T_map_scan: found.T_map_scan,
             covariance: self.covariance(&found),
@@ -234,14 +213,14 @@ impl Tracker {
         }
         self.remember_doubt(&step, &found);
         self.expectation.add(&found);
-        let mut step = step;
-        let mut found = found;
-        if was_expected && self.doubted.is_empty() && self.keyframes.is_new(&found.T_map_scan) {
-            if let Some(there) = self.closed_loop(scan, &found) {
-                step.T_map_scan = there.T_map_scan;
-                step.covariance = self.covariance(&there);
-                found = there;
-            }
+        if was_expected
+            && self.doubted.is_empty()
+            && self.keyframes.is_new(&found.T_map_scan)
+            && let Some(there) = self.closed_loop(scan, &found)
+        {
+            step.T_map_scan = there.T_map_scan;
+            step.covariance = self.covariance(&there);
+            found = there;
         }
         let points = found.within.as_ref().map_or(&scan.points, |(_, points)| points);
         self.take(scan, points, step)
@@ -250,42 +229,6 @@ impl Tracker {
     /// Gives the loops that the last scan has closed.
     pub fn take_loops(&mut self) -> Vec<Loop> {
         std::mem::take(&mut self.loops)
-    }
-
-    /// The motion within the next scan, as it is expected.
-    pub fn expected_within(&self) -> MotionWithin {
-        let last = Vector6::from(self.motion.log());
-        // At the next scan's reference, by the twists at the middles between the last three.
-        let twist = self.motion_before.map_or(last, |before| last + 1.5 * (last - before));
-        MotionWithin {
-            times: Vec::new(),
-            twist,
-            since: (self.since == 1 && !self.mapped.is_empty() && !self.is_lost).then_some((
-                self.last,
-                self.has_motion.then_some(last),
-            )),
-            farthest: self.correspondence_distance(),
-            deviation: self.settings.alignment.deskew_deviation,
-            range: self.median_range.max(1.0),
-        }
-    }
-
-    /// Deskews the first scan by the motion that the second one has shown, and aligns that anew.
-    fn deskew_first(&mut self, scan: &ThinnedScan, found: ScanAlignment) -> Option<ScanAlignment> {
-        let Some(first) = self.first.take() else { return Some(found) };
-        let mut found = found;
-        for _ in 0..self.settings.alignment.deskew_steps {
-            // Both scans are bent nearly alike, so that the poses tell the motion.
-            let twist = Vector6::from(found.T_map_scan.log());
-            let first = first.deskewed_anew(twist, &self.settings)?;
-            let scan = scan.deskewed_anew(twist, &self.settings)?;
-            self.map = LocalMap::new(&self.settings.map);
-            self.map.add(first.points.iter().copied(), 0);
-            self.keyframes.remove(&[0]);
-            self.keyframes.offer(&first, &RigidTransform::identity(), 0);
-            found = self.aligned(&scan, found.T_map_scan)?;
-        }
-        Some(found)
     }
 
     fn is_met(&self, found: &ScanAlignment) -> bool {
@@ -352,15 +295,6 @@ impl Tracker {
         2.0 * self.median_range * (0.5 * rotation_angle(motion)).sin() + motion.translation.norm()
     }
 
-    /// Whether a pose that was searched takes the place of the doubted one.
-    fn is_better(&self, searched: &ScanAlignment, doubted: Option<&ScanAlignment>) -> bool {
-        let Some(doubted) = doubted.filter(|doubted| doubted.free_directions.is_empty()) else { return true };
-        let apart = self.distance_at_range(&(doubted.T_map_scan.inverse() * searched.T_map_scan));
-        let gain = self.settings.relocalisation.overlap_gain;
-        apart > self.settings.prediction.min_correspondence_distance
-            && (searched.overlap > doubted.overlap + gain || self.expectation.is_contradicted(doubted))
-    }
-
     /// Whether a doubted pose may be kept: it is near where the sensor was expected, which long after it was lost is
     /// nowhere.
     fn is_expected(&self, found: &ScanAlignment, prediction: &RigidTransform) -> bool {
@@ -392,56 +326,6 @@ impl Tracker {
         self.is_lost
     }
 
-    /// Adds the error of the map, which is that of the scans that it was made of.
-    fn covariance(&self, found: &ScanAlignment) -> Covariance {
-        let to_scan = found.T_map_scan.inverse();
-        let mut of_map = Covariance::zeros();
-        for &(number, share) in &found.scans {
-            if let Some((pose, of_scan)) = &self.mapped[number as usize] {
-                let carried = of_scan.carried(&(to_scan * *pose));
-                of_map.random += carried.random * share;
-                of_map.systematic += carried.systematic * share;
-                of_map.open += carried.open * share;
-            }
-        }
-        let unit = self.median_range;
-        let mut open = of_map.open;
-        for direction in &found.free_directions {
-            for motion in orthonormal(&direction.twists([0.0; 3]), unit) {
-                let twist = unscaled(&motion, unit);
-                open += twist * twist.transpose();
-            }
-        }
-        let random = found.covariance + of_map.random;
-        Covariance { random, systematic: sum_of_alike(&found.systematic, &of_map.systematic, unit), open }
-    }
-
-    /// Puts a scan into the map, and gives its step after those that it confirms.
-    fn take(&mut self, scan: &ThinnedScan, points: &[[f64; 3]], step: Step) -> Vec<Step> {
-        self.go_on(&step);
-        let pose = step.T_map_scan;
-        let steps = if self.trial.is_empty() { vec![step] } else { std::mem::take(&mut self.trial) };
-        self.trial_is_there = false;
-        if steps[0].status == ScanStatus::Relocalised {
-            self.last_mapped = None;
-        }
-        let Some(step) = steps.last().filter(|_| self.has_moved(&pose)) else { return steps };
-        let number = step.number as u32;
-        if self.doubted.is_empty() {
-            self.map.look_through(&scan.range_image, &pose.inverse());
-        }
-        // First of all what leaves: new points need no normals that are made with it.
-        self.map.keep_within(pose.translation.into(), self.map_range);
-        let is_near = |point: &&[f64; 3]| Vector3::from(**point).norm() <= self.map_range;
-        let near = points.iter().filter(is_near).map(|point| pose.transform_point(*point));
-        self.map.add(near, number);
-        self.mapped.resize(step.number + 1, None);
-        self.mapped[step.number] = Some((pose, step.covariance));
-        self.keyframes.offer(scan, &pose, number);
-        self.last_mapped = Some(pose);
-        steps
-    }
-
     /// Expects the next scan from here, with the motion since the last one.
     fn go_on(&mut self, step: &Step) {
         let moved = self.last.inverse() * step.T_map_scan;
@@ -459,16 +343,6 @@ impl Tracker {
         self.last = step.T_map_scan;
         self.since = 1;
         self.number += 1;
-    }
-
-    /// Whether the sensor went on since the last scan of the map.
-    fn has_moved(&self, pose: &RigidTransform) -> bool {
-        let settings = &self.settings.map;
-        self.last_mapped.is_none_or(|last| {
-            let since = last.inverse() * *pose;
-            since.translation.norm() > settings.min_translation
-                || rotation_angle(&since) > settings.min_rotation
-        })
     }
 }
 

@@ -40,7 +40,8 @@ impl Tracker {
         let settings = &self.settings.relocalisation;
         let prediction = self.prediction();
         let points = some_points(scan.coarse.points(), settings.rotation_points);
-        let near = |pose: &RigidTransform| points_near(&points, &self.map, pose, settings.rotation_distance) as f64;
+        let near =
+            |pose: &RigidTransform| points_near(&points, &self.map, pose, settings.rotation_distance) as f64;
         let mut best = (prediction, near(&prediction) + settings.clear_gain * points.len() as f64);
         let least = self.settings.prediction.min_correspondence_distance;
         for start in [self.last, self.last * self.motion.inverse()] {
@@ -65,7 +66,9 @@ impl Tracker {
         let found: Vec<ScanAlignment> = starts
             .into_iter()
             .filter_map(|start| self.aligned_within(scan, start, distance))
-            .filter(|found| found.free_directions.is_empty() && self.is_met(found) && self.is_better(found, doubted))
+            .filter(|found| {
+                found.free_directions.is_empty() && self.is_met(found) && self.is_better(found, doubted)
+            })
             .collect();
         let best = found.iter().max_by(|a, b| a.overlap.total_cmp(&b.overlap))?;
         // Where several rotations are as good, as in a square room, none is known.
@@ -93,10 +96,36 @@ impl Tracker {
 
     /// Ends a trial that a pose found by a search contradicts: the sensor cannot have moved so far.
     fn begin_trial_at(&mut self, found: &ScanAlignment) {
-        let reach = self.correspondence_distance().max(self.median_range * self.settings.prediction.first_error);
+        let reach =
+            self.correspondence_distance().max(self.median_range * self.settings.prediction.first_error);
         let moved = (found.T_map_scan.translation - self.last.translation).norm();
         if moved > reach + self.motion.translation.norm() * self.since as f64 {
             self.trial.clear();
         }
+    }
+
+    /// The pose of another scan near one of several starts, or where it lies best if it is rotated about the first, if
+    /// the map alone leaves no doubt of it.
+    pub fn located(&self, scan: &ThinnedScan, starts: &[RigidTransform]) -> Option<ScanAlignment> {
+        let settings = &self.settings.relocalisation;
+        let distance = self.correspondence_distance().max(settings.max_correspondence_distance);
+        let rotated = starts
+            .first()
+            .into_iter()
+            .flat_map(|around| rotations_on_map(scan.coarse.points(), &self.map, around, settings));
+        let found = starts.iter().copied().chain(rotated);
+        found
+            .filter_map(|start| self.aligned_within(scan, start, distance))
+            .filter(|found| found.free_directions.is_empty() && self.is_met(found))
+            .max_by(|a, b| a.overlap.total_cmp(&b.overlap))
+    }
+
+    /// Whether a pose that was searched takes the place of the doubted one.
+    pub(super) fn is_better(&self, searched: &ScanAlignment, doubted: Option<&ScanAlignment>) -> bool {
+        let Some(doubted) = doubted.filter(|doubted| doubted.free_directions.is_empty()) else { return true };
+        let apart = self.distance_at_range(&(doubted.T_map_scan.inverse() * searched.T_map_scan));
+        let gain = self.settings.relocalisation.overlap_gain;
+        apart > self.settings.prediction.min_correspondence_distance
+            && (searched.overlap > doubted.overlap + gain || self.expectation.is_contradicted(doubted))
     }
 }
