@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import surfsig
 from surfsig import InvalidInputError, PointCloud, geometry, simulate
-from surfsig.odometry import point_times
+from surfsig.odometry.point_times import find_point_times
 
 Array = NDArray[np.float64]
 COUNT = 6
@@ -93,13 +93,15 @@ def test_scans_are_pushed_one_by_one_with_times(moved: tuple[list[PointCloud], A
 def test_fields_that_are_no_times_tell_nothing() -> None:
     points = np.random.default_rng(2).normal(size=(100, 3))
     for values in (np.zeros(100), np.arange(100.0) * 1e12, np.full(100, np.nan), np.repeat([0.0, 0.1], 50)):
-        assert point_times(PointCloud(points, fields={"time": values})) is None
-    assert point_times(PointCloud(points)) is None
-    one = point_times(PointCloud(points, fields={"T": np.linspace(0.0, 1e8, 100)}))
+        assert find_point_times(PointCloud(points, fields={"time": values})) is None
+    assert find_point_times(PointCloud(points)) is None
+    one = find_point_times(PointCloud(points, fields={"T": np.linspace(0.0, 1e8, 100)}))
     assert one is not None
     assert one.duration == pytest.approx(0.1)
     assert one.reference is None
-    on_clock = point_times(PointCloud(points, fields={"timestamp": 1e9 + np.linspace(0.0, 0.1, 100)}), 1e9)
+    on_clock = find_point_times(
+        PointCloud(points, fields={"timestamp": 1e9 + np.linspace(0.0, 0.1, 100)}), 1e9
+    )
     assert on_clock is not None
     assert on_clock.reference == 1e9
     assert on_clock.seconds[0] == pytest.approx(0.0, abs=1e-6)

@@ -39,7 +39,7 @@ class PointTimes:
     """The reference on the clock of the points, in seconds; None if the times are offsets from it."""
 
 
-def point_times(
+def find_point_times(
     cloud: PointCloud, timestamp: float | None = None, spin_rate: float | None = None
 ) -> PointTimes | None:
     """Find the times of a scan's points; None if nothing tells them.
@@ -139,7 +139,7 @@ def deskew(
     if motion.shape != (6,):
         raise InvalidInputError(f"twist must be six numbers, not of shape {motion.shape}")
     if times is None:
-        found = point_times(cloud, timestamp, spin_rate)
+        found = find_point_times(cloud, timestamp, spin_rate)
         if found is None:
             return cloud
         seconds = found.seconds

@@ -14,7 +14,7 @@ from surfsig.arguments import positive_length, thread_count
 from surfsig.errors import InvalidInputError
 from surfsig.missing_returns import missing_returns
 from surfsig.odometry.loop_closing import LoopClosure, closed
-from surfsig.odometry.point_times import PointTimes, point_times
+from surfsig.odometry.point_times import PointTimes, find_point_times
 from surfsig.odometry.result import Odometry, ScanStatus
 from surfsig.point_cloud import PointCloud
 
@@ -151,7 +151,7 @@ class Tracker:
         cloud = PointCloud.of(scan)
         known = None if timestamp is None else float(timestamp)
         if times is None:
-            found = point_times(cloud, known, self._spin_rate)
+            found = find_point_times(cloud, known, self._spin_rate)
         else:
             seconds = np.asarray(times, np.float64)
             if seconds.shape != (len(cloud),):
