@@ -17,6 +17,7 @@ from ctypes import (
     c_float,
     c_int,
     c_int32,
+    c_int64,
     c_size_t,
     c_uint8,
     c_uint32,
@@ -204,6 +205,7 @@ class CInterface:
             getattr(f, f"surfsig_{name}").restype = c_double
         for name in ("primitive_point", "primitive_axis", "surfaces_covariance"):
             getattr(f, f"surfsig_{name}").restype = POINTER(c_double)
+        f.surfsig_odometry_segment.restype = c_int64
         f.surfsig_surfaces_labels.restype = POINTER(c_int32)
         f.surfsig_instances_indices.restype = POINTER(c_uint32)
         f.surfsig_transform_identity.restype = Transform

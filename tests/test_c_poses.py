@@ -1,11 +1,12 @@
 """The C interface's registration and odometry: values are Python's, bit for bit."""
 
-from ctypes import byref, c_double, c_size_t, c_uint32, c_void_p
+from ctypes import POINTER, byref, c_double, c_size_t, c_uint32, c_void_p
 from pathlib import Path
 
 import numpy as np
 import pytest
 from c_interface import PROGRESS, CInterface, Failed, Registration, Scan, ScanPose, Transform, address
+from moving_lidar import moving_scans
 from register_scenes import moved, pose, terrain
 
 import surfsig
@@ -136,5 +137,31 @@ def test_odometry_is_that_of_python(c: CInterface, tmp_path: Path) -> None:
             covariance = np.array(pose.covariance[:]).reshape(6, 6)
             np.testing.assert_array_equal(covariance, expected.covariances[number])
             assert pose.overlap == expected.overlaps[number]
+            assert f.surfsig_odometry_segment(made, c_size_t(number)) == expected.segments[number]
+        assert f.surfsig_odometry_segment(made, c_size_t(len(scans))) == -1
+    finally:
+        f.surfsig_odometry_free(made)
+
+
+def test_points_with_times_are_deskewed_as_in_python(c: CInterface) -> None:
+    scans, _ = moving_scans(3)
+    expected = surfsig.estimate_odometry(scans)
+    f, made, pose = c.functions, c_void_p(), ScanPose()
+    zero = c_double(0.0)
+    c.check(f.surfsig_odometry_new(zero, zero, zero, c_uint32(1), byref(made)))
+    try:
+        for number, scan in enumerate(scans):
+            times = scan.fields["time"].astype(np.float64)
+            # As the scans follow each other at once, an interval is as long as a scan.
+            times /= np.ptp(times)
+            with c.cloud_of(scan.points) as cloud:
+                given = Scan(cloud, None, None)
+                pointer = times.ctypes.data_as(POINTER(c_double))
+                c.check(f.surfsig_odometry_push_timed(made, byref(given), pointer, byref(pose)))
+            np.testing.assert_allclose(pose.T_map_scan.array(), expected.poses[number], atol=1e-9)
+        twist = (c_double * 6)()
+        c.check(f.surfsig_odometry_twist(made, c_size_t(2), twist))
+        interval = float(np.ptp(scans[2].fields["time"].astype(np.float64)))
+        np.testing.assert_allclose(np.array(twist[:]) / interval, expected.twists[2], rtol=1e-6, atol=1e-9)
     finally:
         f.surfsig_odometry_free(made)

@@ -156,7 +156,18 @@ def test_an_odometry_s_page_holds_the_trajectory_and_the_map(tmp_path: Path) -> 
     poses[2] = np.nan
     covariances = np.tile(np.diag([0, 0, 0, 4.0, 1.0, 0.25]), (3, 1, 1))
     status = np.array([0, 0, 2], np.uint8)
-    found = surfsig.Odometry(poses, covariances, status, np.ones(3), [[], [], []], np.arange(3.0), 0.1)
+    found = surfsig.Odometry(
+        poses,
+        covariances,
+        status,
+        np.ones(3),
+        [[], [], []],
+        np.arange(3.0),
+        0.1,
+        np.where(status == 2, -1, 0),
+        np.full((3, 6), np.nan),
+        [],
+    )
     scans = [surfsig.PointCloud(RNG.uniform(size=(60, 3))) for _ in range(3)]
     found.write_report(tmp_path / "page.html", scans)
     report = report_of(tmp_path / "page.html")

@@ -52,7 +52,15 @@ from surfsig.finding import Instance, Instances, Library, LibraryEntry, find_ins
 from surfsig.flat_atom import flat_atom_length
 from surfsig.fusion import fuse_scans
 from surfsig.missing_returns import remove_missing_returns
-from surfsig.odometry import Odometry, ScanStatus, estimate_odometry
+from surfsig.odometry import (
+    LoopClosure,
+    Odometry,
+    ScanStatus,
+    TrackedScan,
+    Tracker,
+    deskew,
+    estimate_odometry,
+)
 from surfsig.point_cloud import PointCloud
 from surfsig.recurrences import EqualSurfaces, Piece, Recurrence, Recurrences, find_recurrences
 from surfsig.registration import (
@@ -120,6 +128,7 @@ __all__ = [
     "InvalidInputError",
     "Library",
     "LibraryEntry",
+    "LoopClosure",
     "MultiwayRegistration",
     "Odometry",
     "OdometrySettings",
@@ -150,9 +159,12 @@ __all__ = [
     "TileSurfaces",
     "TilesFailedError",
     "TimedScan",
+    "TrackedScan",
+    "Tracker",
     "Trajectory",
     "__version__",
     "crop",
+    "deskew",
     "downsample",
     "estimate_odometry",
     "extract",

@@ -10,6 +10,7 @@ from typing import Any
 import moving_sensor
 import numpy as np
 import pytest
+from moving_lidar import moving_scans
 
 import surfsig
 from surfsig import PointCloud
@@ -44,7 +45,7 @@ def test_files_in_any_order_become_a_kitti_file(folder: Path, tmp_path: Path, sh
     assert 0.1 < values.pop("voxel") < 0.3
     assert values == {
         "output": str(output), "format": "kitti", "scans": 6,
-        "tracked": 5, "relocalised": 0, "lost": 0, "too_few_points": 1,
+        "tracked": 5, "relocalised": 0, "lost": 0, "too_few_points": 1, "segments": 1, "loops": 0,
     }  # fmt: skip
     expected = surfsig.estimate_odometry(folder)
     np.testing.assert_array_equal(surfsig.read_trajectory(output).poses, expected.poses)
@@ -111,3 +112,28 @@ def test_ctrl_c_leaves_the_old_file(
     assert shell("odometry", folder, "-o", output).code == 130
     assert output.read_text() == "old"
     assert list(tmp_path.iterdir()) == [output]
+
+
+def test_scans_are_written_without_the_motion_within_them_and_fused(tmp_path: Path, shell: Shell) -> None:
+    scans, _ = moving_scans(5)
+    (tmp_path / "scans").mkdir()
+    for number, cloud in enumerate(scans):
+        surfsig.write(tmp_path / "scans" / f"{number}.ply", cloud)
+    done = shell(
+        "odometry", tmp_path / "scans", "-o", tmp_path / "way.txt",
+        "--deskewed", tmp_path / "straight", "--map", tmp_path / "map.ply",
+    )  # fmt: skip
+    assert (done.code, done.err) == (0, "")
+    found = surfsig.estimate_odometry(tmp_path / "scans")
+    assert len(list((tmp_path / "straight").glob("*.ply"))) == 5
+    expected = surfsig.deskew(surfsig.read(tmp_path / "scans" / "3.ply"), found.twists[3])
+    np.testing.assert_array_equal(surfsig.read(tmp_path / "straight" / "3.ply").points, expected.points)
+    fused = surfsig.read(tmp_path / "map.ply")
+    assert fused.fields["scans"].max() == 5
+    assert len(fused) > 2000
+
+
+def test_without_times_there_is_nothing_to_deskew(folder: Path, tmp_path: Path, shell: Shell) -> None:
+    done = shell("odometry", folder, "-o", tmp_path / "way.txt", "--deskewed", tmp_path / "straight")
+    assert done.code != 0
+    assert "--spin-rate" in done.err

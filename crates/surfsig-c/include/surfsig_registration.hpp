@@ -118,6 +118,21 @@ public:
     check(surfsig_odometry_push(handle_.get(), &given, &pose));
     return pose;
   }
+  /**
+   * Takes the next scan of a sensor that moves while it scans. `times` has one for each point, from the time of the pose
+   * on, in intervals from this scan to the next one.
+   */
+  ScanPose push(const Scan &scan, const std::vector<double> &times) {
+    const surfsig_scan given = scan.get();
+    if (times.size() != surfsig_cloud_size(given.cloud)) {
+      throw std::invalid_argument("there must be one time for each point");
+    }
+    ScanPose pose;
+    check(surfsig_odometry_push_timed(handle_.get(), &given, times.data(), &pose));
+    return pose;
+  }
+  /** Number of the map that a scan's pose is in; -1 where it has none. */
+  std::int64_t segment(std::size_t index) const { return surfsig_odometry_segment(handle_.get(), index); }
   /** Number of scans so far. */
   std::size_t size() const { return surfsig_odometry_size(handle_.get()); }
   /** What is known now of a scan, which may have got a pose by later ones. */

@@ -1,6 +1,6 @@
 //! The poses of a sensor that moves, scan by scan.
 
-use crate::arrays::{array, present, put, put_new};
+use crate::arrays::{array, present, put, put_new, room};
 use crate::code::{Failure, guarded, surfsig_code};
 use crate::options::thread_count;
 use crate::registration::{SURFSIG_FREE_DIRECTIONS, surfsig_free_direction, surfsig_scan};
@@ -148,6 +148,71 @@ pub unsafe extern "C" fn surfsig_odometry_push(
     })
 }
 
+/// Takes the next scan of a sensor that moves while it scans: points are taken to where they would have been measured at
+/// the time of the pose, by a constant twist that is refined with the pose.
+///
+/// @param odometry The sequence.
+/// @param scan The scan; its directions are not looked at.
+/// @param times Of each point, from the time of the pose on, in intervals from this scan to the next one: -0.5 to 0.5 for
+/// a sensor that scans all along, and a pose at the middle. What is not finite counts as 0.
+/// @param pose Where the scan's result is put; null where nobody wants it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn surfsig_odometry_push_timed(
+    odometry: Option<&mut surfsig_odometry>,
+    scan: *const surfsig_scan,
+    times: *const f64,
+    pose: *mut surfsig_scan_pose,
+) -> surfsig_code {
+    guarded(|| {
+        let odometry = &mut present(odometry, "odometry")?.odometry;
+        // SAFETY: the caller gives a scan whose pointers are as they say.
+        let scan = unsafe { array(scan, 1, "scan")?[0].checked("scan")? };
+        // SAFETY: the caller gives as many times as the scan has points, or null.
+        let times = unsafe { array(times, scan.cloud.len(), "times")? };
+        odometry.push_timed(&scan, times)?;
+        match odometry.poses().last() {
+            // SAFETY: the caller gives room for a result.
+            Some(last) if !pose.is_null() => unsafe { put(pose, surfsig_scan_pose::of(last), "pose") },
+            _ => Ok(()),
+        }
+    })
+}
+
+/// Number of the map that a scan's pose is in, from 0: where a sensor stays lost, another map is begun, whose frame is
+/// that of its first scan. -1 for a scan without a pose, one that there is not, and null.
+#[unsafe(no_mangle)]
+pub extern "C" fn surfsig_odometry_segment(odometry: Option<&surfsig_odometry>, index: usize) -> i64 {
+    let pose = odometry.and_then(|odometry| odometry.odometry.poses().get(index));
+    let segment = pose.filter(|pose| pose.T_map_scan.is_some()).map(|pose| pose.segment);
+    segment.and_then(|segment| i64::try_from(segment).ok()).unwrap_or(-1)
+}
+
+/// Gives the twist (rotation vector in radians, then translation) in a scan's own axes by which the sensor moves from
+/// that scan to the next one, if its motion goes on: NaN where no times of points were given, and where there is no pose.
+///
+/// @param odometry The sequence.
+/// @param index Number of a scan, from 0.
+/// @param twist Room for 6 doubles.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn surfsig_odometry_twist(
+    odometry: Option<&surfsig_odometry>,
+    index: usize,
+    twist: *mut f64,
+) -> surfsig_code {
+    guarded(|| {
+        let poses = present(odometry, "odometry")?.odometry.poses();
+        let found = poses.get(index).ok_or_else(|| outside(index, poses.len()))?;
+        // SAFETY: the caller gives room for six values, or null.
+        let room = unsafe { room(twist, 6, "twist")? };
+        room.copy_from_slice(&found.twist.unwrap_or([f64::NAN; 6]));
+        Ok(())
+    })
+}
+
+fn outside(index: usize, count: usize) -> Failure {
+    Failure::invalid_input(format!("scan {index} is outside a sequence of {count}"))
+}
+
 /// Number of scans so far; 0 for null.
 #[unsafe(no_mangle)]
 pub extern "C" fn surfsig_odometry_size(odometry: Option<&surfsig_odometry>) -> usize {
@@ -174,9 +239,7 @@ pub unsafe extern "C" fn surfsig_odometry_pose(
 ) -> surfsig_code {
     guarded(|| {
         let poses = present(odometry, "odometry")?.odometry.poses();
-        let outside =
-            || Failure::invalid_input(format!("scan {index} is outside a sequence of {}", poses.len()));
-        let found = poses.get(index).ok_or_else(outside)?;
+        let found = poses.get(index).ok_or_else(|| outside(index, poses.len()))?;
         // SAFETY: the caller gives room for a result, or null.
         unsafe { put(pose, surfsig_scan_pose::of(found), "pose") }
     })

@@ -4,7 +4,7 @@ use crate::extract::Points;
 use crate::registration::free_directions_to_python;
 use crate::settings::settings_class;
 use crate::to_python;
-use numpy::{IntoPyArray, PyArrayMethods};
+use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use surfsig::Scan;
@@ -51,6 +51,9 @@ settings_class! {
     }
 }
 
+/// The scan, the earlier one, T_earlier_scan, and the scan's pose by the way around.
+type LoopInPython = (usize, usize, [[f64; 4]; 4], [[f64; 4]; 4]);
+
 /// Follows a sensor from scan to scan; see the crate's `Odometry`.
 #[pyclass(module = "surfsig._surfsig")]
 pub struct Odometry {
@@ -74,19 +77,25 @@ impl Odometry {
         Ok(Self { odometry: surfsig::Odometry::new(settings).map_err(to_python)? })
     }
 
-    /// Takes the next scan: points (n, 3) of either precision.
-    #[pyo3(signature = (points, *, origin, viewpoint=None))]
+    /// Takes the next scan: points (n, 3) of either precision, and their times in intervals between scans, where these
+    /// are known. Gives the numbers of the scans whose results are new.
+    #[pyo3(signature = (points, *, origin, viewpoint=None, times=None))]
     fn push(
         &mut self,
         py: Python<'_>,
         points: Points<'_>,
         origin: [f64; 3],
         viewpoint: Option<[f64; 3]>,
-    ) -> PyResult<()> {
+        times: Option<PyReadonlyArray1<'_, f64>>,
+    ) -> PyResult<Vec<usize>> {
         let scan = Scan { viewpoint, ..Scan::new(points.cloud(origin)?) };
         let odometry = &mut self.odometry;
-        py.detach(|| odometry.push(&scan)).map_err(to_python)?;
-        Ok(())
+        let times = times.as_ref().map(|times| times.as_slice()).transpose()?;
+        let found = py.detach(|| match times {
+            Some(times) => odometry.push_timed(&scan, times),
+            None => odometry.push(&scan),
+        });
+        Ok(found.map_err(to_python)?.iter().map(|pose| pose.scan).collect())
     }
 
     /// Number of scans so far.
@@ -100,21 +109,39 @@ impl Odometry {
         self.odometry.voxel()
     }
 
-    /// Arrays with an entry for each scan: poses, covariances, status, overlaps; and a list of free
-    /// directions of each.
-    fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    /// Loops: the scan, the earlier one, T_earlier_scan, and the scan's pose by the way around.
+    fn loops(&self) -> Vec<LoopInPython> {
+        let found = self.odometry.loops().iter();
+        let told = |one: &surfsig::LoopClosure| {
+            (one.scan, one.earlier, one.T_earlier_scan.to_matrix(), one.T_map_scan_before.to_matrix())
+        };
+        found.map(told).collect()
+    }
+
+    /// Arrays with an entry for each scan, or for the last one: poses, covariances, status, segments, overlaps, twists;
+    /// and a list of free directions of each.
+    #[pyo3(signature = (*, last_only=false))]
+    fn arrays<'py>(&self, py: Python<'py>, last_only: bool) -> PyResult<Bound<'py, PyDict>> {
         let found = self.odometry.poses();
+        let found = if last_only { &found[found.len().saturating_sub(1)..] } else { found };
         let matrix = |pose: &surfsig::ScanPose| {
             pose.T_map_scan.map_or([[f64::NAN; 4]; 4], |transform| transform.to_matrix())
         };
         let poses: Vec<f64> = found.iter().flat_map(matrix).flatten().collect();
         let covariances: Vec<f64> = found.iter().flat_map(|pose| pose.covariance).flatten().collect();
         let status: Vec<u8> = found.iter().map(|pose| pose.status as u8).collect();
+        let segments: Vec<i64> = found
+            .iter()
+            .map(|pose| if pose.T_map_scan.is_some() { pose.segment as i64 } else { -1 })
+            .collect();
         let overlaps: Vec<f64> = found.iter().map(|pose| pose.overlap).collect();
         let arrays = PyDict::new(py);
         arrays.set_item("poses", poses.into_pyarray(py).reshape([found.len(), 4, 4])?)?;
         arrays.set_item("covariances", covariances.into_pyarray(py).reshape([found.len(), 6, 6])?)?;
         arrays.set_item("status", status.into_pyarray(py))?;
+        let twists: Vec<f64> = found.iter().flat_map(|pose| pose.twist.unwrap_or([f64::NAN; 6])).collect();
+        arrays.set_item("twists", twists.into_pyarray(py).reshape([found.len(), 6])?)?;
+        arrays.set_item("segments", segments.into_pyarray(py))?;
         arrays.set_item("overlaps", overlaps.into_pyarray(py))?;
         let free: Vec<_> =
             found.iter().map(|pose| free_directions_to_python(&pose.free_directions)).collect();

@@ -49,6 +49,14 @@ pub enum Error {
     /// A neighbourhood of no points.
     #[error("at least one neighbour must be asked for")]
     NoNeighbors,
+    /// There are not as many times as points.
+    #[error("{times} times for {points} points")]
+    TimesMismatch {
+        /// Number of times.
+        times: usize,
+        /// Number of points.
+        points: usize,
+    },
     /// A direction must be given for every query, or for none.
     #[error("{directions} directions for {queries} queries")]
     DirectionsMismatch {

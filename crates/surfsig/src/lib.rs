@@ -105,8 +105,8 @@ pub use moments::{EXPONENTS, MOMENTS, Moments, Scalar, slot};
 pub use monitor::Monitor;
 pub use neighbor_distances::mean_neighbor_distances;
 pub use odometry::{
-    ExpectationSettings, MapSettings, Odometry, OdometrySettings, PredictionSettings, RelocalisationSettings,
-    ScaleSettings, ScanAlignmentSettings, ScanPose, ScanStatus,
+    ExpectationSettings, LoopClosure, MapSettings, Odometry, OdometrySettings, PredictionSettings,
+    RelocalisationSettings, ScaleSettings, ScanAlignmentSettings, ScanPose, ScanStatus, SegmentSettings,
 };
 pub use orientation::consistent_directions;
 pub use point_cloud::{Offsets, PointCloud, Radius};

@@ -12,7 +12,9 @@ from surfsig.cli.console import number, on_terminal, print_json, print_table, pr
 from surfsig.cli.options import CLOUD, input_options, json_option, quiet_option, threads_option
 
 if TYPE_CHECKING:
+    from surfsig.files.sequence import ScanSequence
     from surfsig.files.trajectory import TrajectoryFormat
+    from surfsig.odometry import Odometry
 
 
 @click.command("odometry", no_args_is_help=True)
@@ -37,6 +39,26 @@ if TYPE_CHECKING:
 )
 @click.option("--map-range", type=float, help="Of the map about the sensor.  [default: by the scans]")
 @click.option(
+    "--spin-rate",
+    type=float,
+    metavar="HZ",
+    help="Of a lidar that spins while it moves, where points have no times; negative if clockwise.",
+)
+@click.option("--no-loops", is_flag=True, help="Leave the trajectory as it is where the sensor comes back.")
+@click.option(
+    "--map",
+    "map_file",
+    type=CLOUD,
+    metavar="FILE",
+    help="Write what all scans saw: a point per voxel, its normal, and by how many scans it was seen.",
+)
+@click.option(
+    "--deskewed",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="FOLDER",
+    help="Write the scans without the sensor's motion within them, as PLY.",
+)
+@click.option(
     "--report", type=CLOUD, metavar="FILE.html", help="Write a page with the trajectory and the map."
 )
 @input_options
@@ -52,6 +74,10 @@ def odometry_command(
     voxel: float | None,
     distance: float | None,
     map_range: float | None,
+    spin_rate: float | None,
+    no_loops: bool,
+    map_file: Path | None,
+    deskewed: Path | None,
     report: Path | None,
     threads: int | None,
     as_json: bool,
@@ -71,12 +97,13 @@ def odometry_command(
       surfsig odometry scans/ -o trajectory.tum
       surfsig odometry 'scans/scan_*.ply' -o trajectory.txt
       surfsig odometry drive.bag --topic /points -o trajectory.tum
+      surfsig odometry drive.bag -o trajectory.tum --deskewed straight/
     """  # noqa: D301
     import surfsig
     from surfsig.files import trajectory_format
     from surfsig.files.atomic import check_target
 
-    for target in (output, covariances, report):
+    for target in (output, covariances, map_file, report):
         if target is not None:
             check_target(target)
     shown = on_terminal() and not quiet
@@ -88,6 +115,8 @@ def odometry_command(
             voxel=voxel,
             distance=distance,
             map_range=map_range,
+            spin_rate=spin_rate,
+            close_loops=not no_loops,
             threads=threads,
             progress=progress,
         )
@@ -97,18 +126,57 @@ def odometry_command(
     if counts["lost"]:
         warnings.warn(f"{counts['lost']} of {len(found)} scans are lost", stacklevel=1)
     chosen = trajectory_format(output) if form is None else form
-    surfsig.write_trajectory(output, found.poses, found.timestamps, format=chosen)
+    longest = found.longest_segment
+    surfsig.write_trajectory(output, found.poses_of(longest), found.timestamps, format=chosen)
+    others = [segment for segment in sorted(set(found.segments.tolist())) if segment not in (-1, longest)]
+    for segment in others:
+        beside = output.with_name(f"{output.stem}.segment{segment}{output.suffix}")
+        surfsig.write_trajectory(beside, found.poses_of(segment), found.timestamps, format=chosen)
+        warnings.warn(
+            f"{int((found.segments == segment).sum())} scans are in another map, whose relation to the "
+            f"first is not known: {beside}",
+            stacklevel=1,
+        )
     if covariances is not None:
         surfsig.write_covariances(covariances, found.covariances)
+    if map_file is not None:
+        surfsig.write(map_file, found.map((scan.cloud for scan in sequence), spin_rate=spin_rate))
+    if deskewed is not None:
+        _write_deskewed(deskewed, sequence, found, spin_rate)
     if report is not None:
         # Read once more: a sequence may be larger than memory.
         clouds = (scan.cloud for scan in sequence)
         found.write_report(report, clouds, title=f"Trajectory of {scans[0].name}")
     if as_json:
-        values = {"output": str(output), "format": chosen, "scans": len(found), **counts}
+        values = {
+            "output": str(output),
+            "format": chosen,
+            "scans": len(found),
+            **counts,
+            "segments": 1 + len(others),
+            "loops": len(found.loops),
+        }
         print_json({**values, "length": found.length, "voxel": found.voxel})
     elif shown:
         rows = [("scans", f"{len(found):,}")]
         rows += [(name.replace("_", " "), f"{count:,}") for name, count in counts.items() if count]
         rows += [("length", number(found.length)), ("voxel", number(found.voxel))]
         print_table(f"{output}", rows, err=True)
+
+
+def _write_deskewed(folder: Path, sequence: ScanSequence, found: Odometry, spin_rate: float | None) -> None:
+    """Read the scans once more, and write each as it would be if its sensor had stood still."""
+    import numpy as np
+
+    import surfsig
+
+    if not np.isfinite(found.twists).any():
+        raise surfsig.InvalidInputError(
+            "no scan has times of its points: --spin-rate gives them by the angle"
+        )
+    folder.mkdir(parents=True, exist_ok=True)
+    digits = len(str(len(found)))
+    for index, scan in enumerate(sequence):
+        timestamp = None if scan.timestamp == index else scan.timestamp
+        cloud = surfsig.deskew(scan.cloud, found.twists[index], timestamp=timestamp, spin_rate=spin_rate)
+        surfsig.write(folder / f"{index:0{digits}d}.ply", cloud)

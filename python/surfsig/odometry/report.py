@@ -34,7 +34,8 @@ def report_html(
     most_points
         Points that the page holds, of all scans together.
     """
-    known = np.asarray(np.isfinite(found.poses).all(axis=(1, 2)))
+    # Worlds whose relation nobody knows are not drawn into one.
+    known = np.asarray(found.segments == found.longest_segment) & (found.segments >= 0)
     positions = np.where(known[:, None], found.poses[:, :3, 3], np.nan)
     rotations = found.poses[:, :3, :3]
     # The covariance is in the scan's own frame; its translations turn with the scan.
@@ -45,6 +46,9 @@ def report_html(
     if not layers:
         layers = [Layer("positions", positions, columns={"scan": np.arange(len(positions))})]
     told = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in found.counts().items() if count)
+    others = int((found.segments >= 0).sum() - known.sum())
+    if others:
+        told += f" ({others} in other maps, which are not drawn)"
     text = (
         f"{len(found)} scans: {told or 'none'}; {found.length:.4g} long. "
         "Ellipsoids are of three standard deviations of the position."

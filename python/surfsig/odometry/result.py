@@ -11,6 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.alignment.free_directions import FreeDirection
+from surfsig.arguments import positive_length
+from surfsig.odometry.fused_map import fused_map
+from surfsig.odometry.loop_closing import LoopClosure
+from surfsig.odometry.point_times import deskew
 from surfsig.odometry.report import report_html
 from surfsig.page import write_page
 from surfsig.point_cloud import PointCloud
@@ -35,7 +39,8 @@ class ScanStatus(enum.IntEnum):
 class Odometry:
     """The trajectory of a sensor: one struct of arrays, with a status for each of n scans.
 
-    The world is the frame of the first scan that has a pose. NaN stands where there is none.
+    The world is the frame of the first scan that has a pose; where a sensor stays lost, another one begins
+    (`segments`). NaN stands where there is none.
     """
 
     poses: Array
@@ -58,6 +63,15 @@ class Odometry:
     voxel: float
     """Edge of the voxels in which scans and map were thinned, in the scans' unit; NaN if no scan had enough
     points."""
+    segments: NDArray[np.int64]
+    """Number of the world that each pose is given in, (n,): where a sensor stays lost, another map is begun,
+    whose first scan is its world; -1 where there is no pose."""
+    twists: Array
+    """Of the sensor at each scan, (n, 6): rotation vector in radians and translation, each a second, in the
+    scan's own axes. NaN where the times of points are not known, and where there is no pose."""
+    loops: list[LoopClosure]
+    """Scans that the sensor came back with to where it was: what it had drifted by is distributed over the
+    way between. Covariances are those before, and so too large rather than too small."""
 
     def __len__(self) -> int:
         """Return the number of scans."""
@@ -111,8 +125,67 @@ class Odometry:
         """
         write_page(path, report_html(self, scans, title))
 
+    def map(
+        self,
+        scans: Iterable[PointCloud],
+        *,
+        voxel: float | None = None,
+        spin_rate: float | None = None,
+    ) -> PointCloud:
+        """Fuse the scans of the longest segment into one cloud, of a point for each voxel.
+
+        Parameters
+        ----------
+        scans
+            In their order, each in its own frame, as they were followed; a motion within a scan is taken
+            out by the times of its fields.
+        voxel
+            Edge of the voxels, in the scans' unit; by default that of the map.
+        spin_rate
+            As it was given to `estimate_odometry`.
+
+        Returns
+        -------
+        PointCloud
+            In the world: the mean of each voxel's points, with the fields nx, ny, nz, the unit normal on the
+            side of the sensors (NaN where neighbours are too few), and scans, by how many scans it was seen.
+
+        Raises
+        ------
+        InvalidInputError
+            If the voxel is no length, or no scan has a pose.
+        """
+        edge = positive_length(self.voxel if voxel is None else voxel, "voxel")
+        straight = (
+            deskew(cloud, twist, timestamp=timestamp, spin_rate=spin_rate)
+            for cloud, twist, timestamp in zip(scans, self.twists, self.timestamps.tolist(), strict=False)
+        )
+        return fused_map(straight, self.poses_of(self.longest_segment), edge)
+
     @property
     def length(self) -> float:
-        """Length of the trajectory, in the scans' unit: straight lines between the scans that have a pose."""
-        positions = self.poses[np.isfinite(self.poses).all(axis=(1, 2)), :3, 3]
-        return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
+        """Length of the trajectory, in the scans' unit: straight lines between scans in one world."""
+        known = np.flatnonzero(self.segments >= 0)
+        steps = np.linalg.norm(np.diff(self.poses[known, :3, 3], axis=0), axis=1)
+        return float(steps[np.diff(self.segments[known]) == 0].sum())
+
+    @property
+    def longest_segment(self) -> int:
+        """Number of the segment with the most scans, the first of several; -1 where no scan has a pose."""
+        numbers = self.segments[self.segments >= 0]
+        return int(np.bincount(numbers).argmax()) if len(numbers) else -1
+
+    def poses_of(self, segment: int) -> Array:
+        """Give the poses in one world.
+
+        Parameters
+        ----------
+        segment
+            Its number.
+
+        Returns
+        -------
+        numpy.ndarray
+            T_world_scan, (n, 4, 4); NaN for scans that are in another one or have no pose.
+        """
+        return np.where((self.segments == segment)[:, None, None], self.poses, np.nan)

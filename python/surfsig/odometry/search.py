@@ -8,17 +8,14 @@ from collections.abc import Callable, Iterable, Iterator, Sized
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from surfsig import _surfsig
 from surfsig._surfsig import OdometrySettings
-from surfsig.alignment.free_directions import free_direction
-from surfsig.arguments import positive_length, progress_callback, thread_count
+from surfsig.arguments import progress_callback
 from surfsig.errors import InvalidInputError
 from surfsig.files.sequence import ScanSequence, TimedScan, open_scan_sequence, scan_or_empty
-from surfsig.missing_returns import remove_missing_returns
 from surfsig.odometry.result import Odometry
+from surfsig.odometry.tracker import Tracker
 from surfsig.point_cloud import PointCloud
 
 Scans = (
@@ -35,6 +32,8 @@ def estimate_odometry(
     voxel: float | None = None,
     distance: float | None = None,
     map_range: float | None = None,
+    spin_rate: float | None = None,
+    close_loops: bool = True,
     settings: OdometrySettings | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
@@ -45,8 +44,12 @@ def estimate_odometry(
     the last motion leads. Where it lies there worse than scans did of late, it is searched among keyframes by
     the signatures of its keypoints; a pose that is found so counts only if the map explains all of the scan,
     or the next scans follow it. Where the map leaves a motion open, as along a smooth corridor, that is named
-    (`Odometry.free_directions`), its variance is infinite, and the last motion goes on in it. Nothing
-    needs to be set, and the result is always the same.
+    (`Odometry.free_directions`), its variance is infinite, and the last motion goes on in it. Where the
+    sensor
+    stays lost, another map is begun (`Odometry.segments`). Where points have times (fields `t`, `time`,
+    `timestamp`, `offset_time`, `gps_time`, or `spin_rate`), the motion within each scan is found with its
+    pose, and taken out. Nothing needs to be set, and the result is always the same. `Tracker` takes the scans
+    one by one.
 
     Parameters
     ----------
@@ -64,6 +67,14 @@ def estimate_odometry(
     map_range
         Distance from the sensor up to which the map is kept, in the scans' unit; by default 1.2 times the
         distance within which 99 in 100 points of a scan are.
+    spin_rate
+        Rotations a second of a lidar that spins while it moves, where its points have no times:
+        counter-clockwise
+        about z, or negative if it spins clockwise. A scan begins and ends behind, at -x, and its pose is
+        that at its middle.
+    close_loops
+        Whether what the sensor has drifted by when it comes back to where it was is distributed over the way
+        between (`Odometry.loops`).
     settings
         For experts; `OdometrySettings` describes what may be changed.
     threads
@@ -91,50 +102,33 @@ def estimate_odometry(
         If a file cannot be read, which then counts as a scan without points, a bag ends too early, or missing
         returns at (0, 0, 0) are left out.
     """
-
-    def length(value: float | None, name: str) -> float | None:
-        return None if value is None else positive_length(value, name)
-
-    odometry = _surfsig.Odometry(
-        voxel=length(voxel, "voxel"),
-        max_correspondence_distance=length(distance, "distance"),
-        map_range=length(map_range, "map_range"),
+    tracker = Tracker(
+        voxel=voxel,
+        distance=distance,
+        map_range=map_range,
+        spin_rate=spin_rate,
         settings=settings,
-        threads=thread_count(threads),
+        threads=threads,
     )
     tell = progress_callback(progress)
     if isinstance(scans, (str, os.PathLike)):
         scans = open_scan_sequence(scans)
     total = len(scans) if isinstance(scans, Sized) else None
-    timestamps: list[float] = []
-    missing_returns = 0
     for number, scan in enumerate(_timed(scans)):
-        cloud = remove_missing_returns(scan.cloud)
-        missing_returns += len(scan.cloud) - len(cloud)
-        odometry.push(cloud.offsets, origin=cloud.origin.tolist(), viewpoint=_viewpoint(cloud))
-        timestamps.append(scan.timestamp)
+        # Numbers in place of times are no clock.
+        timestamp = None if scan.timestamp == number else scan.timestamp
+        tracker.push(scan.cloud, timestamp=timestamp)
         if tell is not None:
             tell(number + 1, number + 1 if total is None else total)
-    if not timestamps:
+    if not len(tracker):
         raise InvalidInputError("there are no scans")
-    if missing_returns:
+    if tracker.missing_returns:
         warnings.warn(
-            f"{missing_returns} points of {len(timestamps)} scans are at (0, 0, 0), where a lidar's missing "
-            "returns are written; they are left out",
+            f"{tracker.missing_returns} points of {len(tracker)} scans are at (0, 0, 0), where a lidar's "
+            "missing returns are written; they are left out",
             stacklevel=2,
         )
-    arrays = odometry.arrays()
-    free = [[free_direction(*one) for one in every] for every in arrays.pop("free_directions")]
-    return Odometry(
-        **arrays,
-        free_directions=free,
-        timestamps=np.array(timestamps, np.float64),
-        voxel=np.nan if odometry.voxel is None else odometry.voxel,
-    )
-
-
-def _viewpoint(cloud: PointCloud) -> list[float] | None:
-    return None if cloud.viewpoint is None else cloud.viewpoint.tolist()
+    return tracker.result(close_loops=close_loops)
 
 
 def _timed(scans: Any) -> Iterator[TimedScan]:

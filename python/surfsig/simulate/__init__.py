@@ -24,7 +24,7 @@ from .poses import UP, facing, pose, turn
 from .round_trip import circuit, circuit_poses
 from .scanner import Scanner
 from .scene import Hits, Placed, Scene
-from .sensors import Calibration, DepthCamera, Lidar, bent_calibration, distorted, scan
+from .sensors import Calibration, DepthCamera, Lidar, bent_calibration, distorted, scan, scan_moving
 from .stereo_camera import StereoCamera
 from .surfaces import Box, Cone, Cylinder, Plane, Rectangle, Sphere, Surface
 
@@ -70,6 +70,7 @@ __all__ = [
     "pose",
     "room",
     "scan",
+    "scan_moving",
     "storey",
     "transform_points",
     "tunnel",

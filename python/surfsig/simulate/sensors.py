@@ -208,6 +208,56 @@ def scan(
     return PointCloud((ranges[:, None] * rays[met]).astype(np.float32), viewpoint=np.zeros(3))
 
 
+def scan_moving(
+    scene: Scene, sensor: Lidar, poses: ArrayLike, *, seed: int = 0, period: float = 0.1
+) -> PointCloud:
+    """Scan a scene by a lidar that moves while it spins: its scan is bent by the motion.
+
+    Parameters
+    ----------
+    scene
+        What there is.
+    sensor
+        The lidar; all its lasers fire at once.
+    poses
+        (steps, 4, 4), T_scene_sensor at each of its directions, from behind counter-clockwise to behind.
+    seed
+        Of noise and dropouts; the same seed gives the same scan.
+    period
+        Seconds that the scan takes.
+
+    Returns
+    -------
+    PointCloud
+        Each point in the sensor's axes at its own time, float32, with the viewpoint at (0, 0, 0) and the
+        field ``time``: seconds from the middle of the scan on, float32.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is not one pose for each step, or nothing is met.
+    """
+    T_scene_sensor = np.asarray(poses, np.float64)
+    if T_scene_sensor.shape != (sensor.steps, 4, 4):
+        raise InvalidInputError(f"poses must be ({sensor.steps}, 4, 4), not {T_scene_sensor.shape}")
+    rays = sensor.rays()
+    step = np.tile(np.arange(sensor.steps), sensor.lines)
+    at = T_scene_sensor[step]
+    hits = scene.cast(at[:, :3, 3], np.einsum("nij,nj->ni", at[:, :3, :3], rays))
+    rng = np.random.default_rng([seed, len(rays)])
+    noise, luck = rng.normal(size=len(rays)), rng.random(len(rays))
+    met = (hits.t < sensor.max_range) & (luck >= sensor.dropout)
+    if not met.any():
+        raise InvalidInputError("the sensor meets nothing of the scene")
+    ranges = hits.t[met] + sensor.noise * noise[met]
+    times = period * (step / sensor.steps - 0.5)
+    return PointCloud(
+        (ranges[:, None] * rays[met]).astype(np.float32),
+        viewpoint=np.zeros(3),
+        fields={"time": times[met].astype(np.float32)},
+    )
+
+
 def _mixed(
     ranges: Array, surface: NDArray[np.int32], width: int, share: float, rng: np.random.Generator
 ) -> Array:

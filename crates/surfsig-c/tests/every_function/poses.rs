@@ -85,12 +85,30 @@ pub fn odometries(called: &mut Called) {
         call!(called, surfsig_odometry_push(unsafe { made.as_mut() }, &nowhere, pose) gives INVALID);
         call!(called, surfsig_odometry_push(unsafe { made.as_mut() }, &scan, null_mut()) gives OK);
     }
+    call!(called, surfsig_odometry_push_timed(None, null(), null(), pose) gives INVALID);
+    for (cloud, points) in clouds.iter().zip(odd_clouds()) {
+        let scan = surfsig_scan { cloud: cloud.0, viewpoint: null(), directions: null() };
+        let times: Vec<f64> =
+            (0..points.len()).map(|k| if k % 7 == 3 { f64::NAN } else { k as f64 * 1e-3 }).collect();
+        if !points.is_empty() {
+            call!(called, surfsig_odometry_push_timed(unsafe { made.as_mut() }, &scan, null(), pose) gives INVALID);
+        }
+        call!(called, surfsig_odometry_push_timed(unsafe { made.as_mut() }, &scan, times.as_ptr(), null_mut()) gives OK);
+    }
+    let mut twist = [0.0; 6];
+    assert_eq!(call!(called, surfsig_odometry_segment(None, 0)), -1);
+    assert_eq!(call!(called, surfsig_odometry_segment(unsafe { made.as_ref() }, 0)), -1);
+    call!(called, surfsig_odometry_twist(None, 0, twist.as_mut_ptr()) gives INVALID);
+    call!(called, surfsig_odometry_twist(unsafe { made.as_ref() }, usize::MAX, twist.as_mut_ptr()) gives INVALID);
+    call!(called, surfsig_odometry_twist(unsafe { made.as_ref() }, 0, null_mut()) gives INVALID);
+    call!(called, surfsig_odometry_twist(unsafe { made.as_ref() }, 0, twist.as_mut_ptr()) gives OK);
+    assert!(twist[0].is_nan());
     let odometry = unsafe { made.as_ref() };
-    assert_eq!(call!(called, surfsig_odometry_size(odometry)), clouds.len());
+    assert_eq!(call!(called, surfsig_odometry_size(odometry)), 2 * clouds.len());
     call!(called, surfsig_odometry_pose(odometry, 0, null_mut()) gives INVALID);
     call!(called, surfsig_odometry_pose(odometry, 0, pose) gives OK);
     assert_eq!(unsafe { room.assume_init() }.status, surfsig_scan_status::TooFewPoints);
-    for index in [clouds.len(), usize::MAX] {
+    for index in [2 * clouds.len(), usize::MAX] {
         call!(called, surfsig_odometry_pose(odometry, index, pose) gives INVALID);
     }
     call!(called, surfsig_odometry_free(owned(made)));

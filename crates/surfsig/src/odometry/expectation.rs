@@ -5,11 +5,15 @@ use super::settings::ExpectationSettings;
 use crate::statistics::median;
 use std::collections::VecDeque;
 
+/// Points that contradict nothing, however few there are.
+const FEW: f64 = 3.0;
+
 /// What the last scans with a pose did; all shares depend on the sensor and its surroundings.
 #[derive(Debug, Clone)]
 pub(super) struct Expectation {
     settings: ExpectationSettings,
     overlaps: VecDeque<f64>,
+    known: VecDeque<f64>,
     free_space: VecDeque<f64>,
     unexplained: VecDeque<f64>,
 }
@@ -17,15 +21,20 @@ pub(super) struct Expectation {
 impl Expectation {
     pub fn new(settings: &ExpectationSettings) -> Self {
         let none = VecDeque::new;
-        Self { settings: settings.clone(), overlaps: none(), free_space: none(), unexplained: none() }
+        Self {
+            settings: settings.clone(),
+            overlaps: none(),
+            known: none(),
+            free_space: none(),
+            unexplained: none(),
+        }
     }
 
     /// Takes a scan that has a pose.
     pub fn add(&mut self, found: &ScanAlignment) {
-        let values = [found.overlap, found.free_space, found.unexplained];
-        for (last, value) in
-            [&mut self.overlaps, &mut self.free_space, &mut self.unexplained].into_iter().zip(values)
-        {
+        let values = [found.overlap, found.known, found.free_space, found.unexplained];
+        let lasts = [&mut self.overlaps, &mut self.known, &mut self.free_space, &mut self.unexplained];
+        for (last, value) in lasts.into_iter().zip(values) {
             last.push_back(value);
             if last.len() > self.settings.scans {
                 last.pop_front();
@@ -35,13 +44,16 @@ impl Expectation {
 
     /// Whether the scan lies on the map as scans do and contradicts nothing.
     pub fn is_met(&self, found: &ScanAlignment) -> bool {
-        let enough = found.overlap >= self.settings.doubted_overlap * self.overlap();
-        enough && !self.is_contradicted(found)
+        // Of a scan that sees what none has seen, less lies on the map.
+        let expected = self.overlap() * (found.known / self.known()).min(1.0);
+        found.overlap >= self.settings.doubted_overlap * expected && !self.is_contradicted(found)
     }
 
     /// Whether scan and map cannot both be, by what either sensor would have measured.
     pub fn is_contradicted(&self, found: &ScanAlignment) -> bool {
-        found.unexplained > self.largest_unexplained() + self.settings.unexplained_excess
+        // A few points may be anything, and of few points they are a large share.
+        let few = FEW / (found.known * found.count as f64).max(1.0);
+        found.unexplained > self.largest_unexplained() + self.settings.unexplained_excess + few
             || found.free_space > self.free_space() + self.settings.free_space_excess
     }
 
@@ -52,15 +64,31 @@ impl Expectation {
         found.free_directions.is_empty() && full && explained && !self.is_contradicted(found)
     }
 
-    /// Whether a new room, or something that moves, may be all that is unexpected.
-    pub fn may_be_new(&self, found: &ScanAlignment) -> bool {
-        let departed = found.free_space <= self.free_space() + self.settings.departed_excess;
-        let arrived = found.unexplained <= self.largest_unexplained() + self.settings.arrived_excess;
-        departed && arrived
+    /// Whether a new room, or something that moves, may be all that is unexpected; `distance` is that from the expected
+    /// pose, in voxels at the median range.
+    pub fn may_be_new(&self, found: &ScanAlignment, distance: f64) -> bool {
+        let settings = &self.settings;
+        let (departed, arrived) = match distance <= settings.near {
+            true => (settings.departed_excess_near, settings.arrived_excess_near),
+            false => (settings.departed_excess, settings.arrived_excess),
+        };
+        found.free_space <= self.free_space() + departed
+            && found.unexplained <= self.largest_unexplained() + arrived
+    }
+
+    /// Whether enough of the scan lies on the map, and determines its pose, where a point at a range counts.
+    pub fn is_believable(&self, found: &ScanAlignment, range: f64) -> bool {
+        let least = self.settings.least_overlap.max(self.settings.min_overlap * found.known);
+        found.overlap >= least && found.deviation(range) <= self.settings.max_deviation
     }
 
     fn overlap(&self) -> f64 {
         median(self.overlaps.iter().copied().collect()).unwrap_or(self.settings.first_overlap)
+    }
+
+    /// Before any scan is known, all of one may be.
+    fn known(&self) -> f64 {
+        median(self.known.iter().copied().collect()).unwrap_or(1.0).max(f64::MIN_POSITIVE)
     }
 
     fn free_space(&self) -> f64 {
@@ -83,12 +111,15 @@ mod tests {
         ScanAlignment {
             T_map_scan: RigidTransform::identity(),
             covariance: Matrix6::identity(),
+            count: 4000,
             overlap,
             free_space,
+            known: 1.0,
             unexplained,
             systematic: Matrix6::zeros(),
             free_directions: Vec::new(),
             scans: Vec::new(),
+            within: None,
         }
     }
 
@@ -111,9 +142,11 @@ mod tests {
         assert!(expectation.is_certain(&lying(0.75, 0.0, 0.019)));
         assert!(!expectation.is_certain(&lying(0.74, 0.0, 0.0)));
         assert!(!expectation.is_certain(&lying(0.8, 0.0, 0.021)));
-        assert!(expectation.may_be_new(&lying(0.5, 0.06, 0.22)));
-        assert!(!expectation.may_be_new(&lying(0.5, 0.0, 0.24)));
-        assert!(!expectation.may_be_new(&lying(0.5, 0.08, 0.0)));
+        assert!(expectation.may_be_new(&lying(0.5, 0.06, 0.22), 1.0));
+        assert!(!expectation.may_be_new(&lying(0.5, 0.0, 0.24), 1.0));
+        assert!(!expectation.may_be_new(&lying(0.5, 0.08, 0.0), 1.0));
+        assert!(expectation.may_be_new(&lying(0.5, 0.3, 0.4), 0.5));
+        assert!(!expectation.may_be_new(&lying(0.5, 0.4, 0.0), 0.5));
     }
 
     #[test]

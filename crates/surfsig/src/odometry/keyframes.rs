@@ -10,6 +10,7 @@ use crate::alignment::{ConsensusSettings, Correspondences};
 use crate::field::{KeypointOptions, keypoints_within, match_fields};
 use crate::visibility::SphericalRangeImage;
 use crate::{FieldOptions, FieldPlaces, Monitor, PointCloud, Radius, RigidTransform};
+use std::collections::BTreeSet;
 
 /// A scan that is kept; lengths are in voxels.
 #[allow(non_snake_case)]
@@ -23,6 +24,18 @@ struct Keyframe {
     range_image: SphericalRangeImage,
     /// Its keypoints, once they have been asked for.
     described: Option<FieldPlaces>,
+    /// Whether the present map has what it saw.
+    is_loaded: bool,
+}
+
+/// Which keyframes say what was in sight.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Which {
+    /// Those whose points are in the present map.
+    Loaded,
+    /// The others.
+    Unloaded,
+    All,
 }
 
 /// The keyframes of a sequence, one for each viewpoint and direction.
@@ -31,25 +44,22 @@ pub(super) struct Keyframes {
     median_range: f64,
     patch_radius: f64,
     kept: Vec<Keyframe>,
+    /// The keyframe that the next search goes on from.
+    next: usize,
 }
 
 impl Keyframes {
     pub fn new(settings: &OdometrySettings, median_range: f64, patch_radius: f64) -> Self {
-        Self { settings: settings.clone(), median_range, patch_radius, kept: Vec::new() }
+        Self { settings: settings.clone(), median_range, patch_radius, kept: Vec::new(), next: 0 }
     }
 
-    /// Keeps a scan, unless there is one of nearly the same pose.
+    /// Keeps a scan, unless there is one of nearly the same pose; of too many keyframes the one leaves that has another
+    /// the nearest to it.
     pub fn offer(&mut self, scan: &ThinnedScan, pose: &RigidTransform, number: u32) {
-        let settings = &self.settings.relocalisation;
-        let to_scan = pose.inverse();
-        let is_alike = |other: &Keyframe| {
-            let between = to_scan * other.T_map_scan;
-            between.translation.norm() < settings.keyframe_distance * self.median_range
-                && rotation_angle(&between) < settings.keyframe_rotation
-        };
-        if self.kept.iter().rev().any(is_alike) {
+        if !self.is_new(pose) {
             return;
         }
+        let settings = &self.settings.relocalisation;
         self.kept.push(Keyframe {
             number,
             T_map_scan: *pose,
@@ -57,13 +67,85 @@ impl Keyframes {
             detail: in_float32(&scan.means(settings.detail_voxel)),
             range_image: scan.range_image.clone(),
             described: None,
+            is_loaded: true,
         });
+        if self.kept.len() > settings.max_kept {
+            self.drop_one();
+        }
     }
 
-    /// Tells which points of a scan at a pose the keyframes next to it would have measured.
-    pub fn would_have_seen(&self, pose: &RigidTransform) -> impl Fn([f64; 3]) -> bool + use<'_> {
+    /// Whether no keyframe in the present map has nearly this pose.
+    pub fn is_new(&self, pose: &RigidTransform) -> bool {
+        let settings = &self.settings.relocalisation;
+        let to_scan = pose.inverse();
+        let is_alike = |other: &Keyframe| {
+            let between = to_scan * other.T_map_scan;
+            other.is_loaded
+                && between.translation.norm() < settings.keyframe_distance * self.median_range
+                && rotation_angle(&between) < settings.keyframe_rotation
+        };
+        !self.kept.iter().rev().any(is_alike)
+    }
+
+    /// Lets the map's scans tell which keyframes are in it: the others neither say what is known nor what is new.
+    pub fn mark_loaded(&mut self, in_map: &BTreeSet<u32>, number: u32) {
+        let recent = self.settings.relocalisation.scans_apart;
+        for keyframe in &mut self.kept {
+            keyframe.is_loaded = in_map.contains(&keyframe.number) || number - keyframe.number < recent;
+        }
+    }
+
+    /// The map of the keyframes around a pose that are not in the present map, and the number of the nearest of them.
+    pub fn unloaded_near(&self, pose: &RigidTransform, map_range: f64) -> Option<(LocalMap, u32)> {
+        let distance = |other: &&Keyframe| (other.T_map_scan.translation - pose.translation).norm();
+        let reach = self.settings.relocalisation.loop_distance * self.median_range;
+        let away = self.kept.iter().filter(|keyframe| !keyframe.is_loaded);
+        let nearest = away.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        (distance(&nearest) <= reach).then(|| {
+            (self.map_of(pose.translation.into(), map_range, |other| !other.is_loaded), nearest.number)
+        })
+    }
+
+    /// The pose of a keyframe.
+    pub fn pose(&self, number: u32) -> Option<RigidTransform> {
+        self.kept.iter().find(|keyframe| keyframe.number == number).map(|keyframe| keyframe.T_map_scan)
+    }
+
+    /// Moves those that are in the present map.
+    pub fn move_loaded(&mut self, correction: &RigidTransform) {
+        for keyframe in self.kept.iter_mut().filter(|keyframe| keyframe.is_loaded) {
+            keyframe.T_map_scan = *correction * keyframe.T_map_scan;
+        }
+    }
+
+    fn drop_one(&mut self) {
+        let distance =
+            |a: &Keyframe, b: &Keyframe| (a.T_map_scan.translation - b.T_map_scan.translation).norm();
+        let gap = |index: usize| {
+            let others = self.kept.iter().enumerate().filter(|(other, _)| *other != index);
+            others.map(|(_, other)| distance(&self.kept[index], other)).fold(f64::INFINITY, f64::min)
+        };
+        let gaps: Vec<f64> = (0..self.kept.len()).map(gap).collect();
+        let closest = (0..gaps.len()).min_by(|a, b| gaps[*a].total_cmp(&gaps[*b]));
+        if let Some(index) = closest {
+            self.kept.remove(index);
+        }
+    }
+
+    /// Tells which points of a scan at a pose the keyframes next to it would have measured: of those in the present map,
+    /// of those that are not, or of all.
+    pub fn would_have_seen(
+        &self,
+        pose: &RigidTransform,
+        which: Which,
+    ) -> impl Fn([f64; 3]) -> bool + use<'_> {
         let distance = |other: &Keyframe| (other.T_map_scan.translation - pose.translation).norm();
-        let mut near: Vec<&Keyframe> = self.kept.iter().collect();
+        let is_asked = |keyframe: &&Keyframe| match which {
+            Which::Loaded => keyframe.is_loaded,
+            Which::Unloaded => !keyframe.is_loaded,
+            Which::All => true,
+        };
+        let mut near: Vec<&Keyframe> = self.kept.iter().filter(is_asked).collect();
         near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
         near.truncate(self.settings.relocalisation.observers);
         let observers: Vec<(RigidTransform, &SphericalRangeImage)> =
@@ -75,18 +157,25 @@ impl Keyframes {
         }
     }
 
+    /// Takes out those of scans whose poses were wrong.
+    pub fn remove(&mut self, numbers: &[usize]) {
+        self.kept.retain(|keyframe| !numbers.contains(&(keyframe.number as usize)));
+    }
+
     /// Of the poses that matches propose, the one that lies best on the map of the keyframes around it, and that map.
+    /// `last` is where the sensor was.
     pub fn find(
         &mut self,
         scan: &ThinnedScan,
+        last: &RigidTransform,
         map_range: f64,
         is_believed: impl Fn(&ScanAlignment) -> bool,
     ) -> Option<(ScanAlignment, LocalMap)> {
         let mut best: Option<(ScanAlignment, LocalMap)> = None;
         let distance = self.settings.relocalisation.max_correspondence_distance;
-        for pose in self.proposals(scan) {
-            let map = self.submap(pose.translation.into(), map_range);
-            let known = |pose: &RigidTransform| self.would_have_seen(pose);
+        for pose in self.proposals(scan, last) {
+            let map = self.map_of(pose.translation.into(), map_range, |_| true);
+            let known = |pose: &RigidTransform| self.would_have_seen(pose, Which::All);
             let Some(found) = align(scan, &map, pose, distance, &self.settings.alignment, known) else {
                 continue;
             };
@@ -98,14 +187,35 @@ impl Keyframes {
         best
     }
 
+    /// The keyframes that are searched now: half of them the nearest to where the sensor was, the others in turn.
+    fn searched(&mut self, last: &RigidTransform) -> Vec<usize> {
+        let most = self.settings.relocalisation.max_keyframes.min(self.kept.len());
+        let distance = |number: &usize| (self.kept[*number].T_map_scan.translation - last.translation).norm();
+        let mut chosen: Vec<usize> = (0..self.kept.len()).collect();
+        chosen.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        chosen.truncate(most.div_ceil(2));
+        while chosen.len() < most {
+            self.next = self.next.checked_sub(1).unwrap_or(self.kept.len() - 1).min(self.kept.len() - 1);
+            if !chosen.contains(&self.next) {
+                chosen.push(self.next);
+            }
+        }
+        chosen
+    }
+
     /// Poses of a scan that enough matches with a keyframe agree with, those of most matches first.
-    fn proposals(&mut self, scan: &ThinnedScan) -> Vec<RigidTransform> {
+    fn proposals(&mut self, scan: &ThinnedScan, last: &RigidTransform) -> Vec<RigidTransform> {
+        let searched = self.searched(last);
+        if searched.is_empty() {
+            return Vec::new();
+        }
         let radius = self.patch_radius;
         let settings = &self.settings.relocalisation;
         let consensus = ConsensusSettings::default();
         let ours = described(&in_float32(&scan.means(settings.detail_voxel)), radius);
         let mut proposals: Vec<(usize, RigidTransform)> = Vec::new();
-        for keyframe in self.kept.iter_mut().rev().take(settings.max_keyframes) {
+        for number in searched {
+            let keyframe = &mut self.kept[number];
             let theirs = keyframe.described.get_or_insert_with(|| described(&keyframe.detail, radius));
             let matches = Correspondences::new(&match_fields(&ours, theirs, true), &ours, theirs, consensus);
             let transform = matches.agreed_transform();
@@ -118,10 +228,10 @@ impl Keyframes {
         proposals.into_iter().take(settings.max_trials).map(|(_, pose)| pose).collect()
     }
 
-    /// The map of the keyframes taken within a distance of a point.
-    fn submap(&self, center: [f64; 3], distance: f64) -> LocalMap {
+    /// The map of some of the keyframes taken within a distance of a point.
+    fn map_of(&self, center: [f64; 3], distance: f64, is_in: impl Fn(&Keyframe) -> bool) -> LocalMap {
         let mut map = LocalMap::new(&self.settings.map);
-        for keyframe in &self.kept {
+        for keyframe in self.kept.iter().filter(|keyframe| is_in(keyframe)) {
             let from: [f64; 3] = keyframe.T_map_scan.translation.into();
             if squared_distance(&from, &center) <= distance * distance {
                 let moved = |point: &[f32; 3]| keyframe.T_map_scan.transform_point(point.map(f64::from));

@@ -2,16 +2,22 @@
 
 use super::settings::MapSettings;
 use super::voxel_index::{Nearest, VoxelIndex, squared_distance};
+use crate::RigidTransform;
 use crate::alignment::{GicpTarget, SURROUNDING, plane_of, surface_goes_on};
+use crate::visibility::{SphericalRangeImage, Visibility};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 /// Distance up to which a point's neighbourhood counts as dense: those that change one are then found in the blocks
 /// next to them.
 const DENSE: f64 = 4.0;
 /// Edge of the cells that sparse points are sorted into: as far as any neighbourhood reaches.
 const CELL: f64 = 16.0;
+/// Points that one thread takes at a time.
+const PART: usize = 1024;
 
 /// One point for each voxel, the first that was seen, with the normal of the surface there.
 ///
@@ -28,6 +34,11 @@ pub(super) struct LocalMap {
     scans: Vec<u32>,
     /// Squared distance to the farthest neighbour that the normal was taken from; infinite where these were too few.
     reaches: Vec<f64>,
+    /// Of the points that were asked for, whether the surface around them goes on.
+    goes_on: Vec<OnceLock<bool>>,
+    /// Scans in a row that have looked through each point.
+    seen_through: Vec<u8>,
+    scans_through: u8,
     index: VoxelIndex,
     /// Points whose neighbours are not within `DENSE`, by cells.
     sparse: FxHashMap<[i32; 3], Vec<u32>>,
@@ -42,6 +53,9 @@ impl LocalMap {
             normals: Vec::new(),
             scans: Vec::new(),
             reaches: Vec::new(),
+            goes_on: Vec::new(),
+            seen_through: Vec::new(),
+            scans_through: settings.scans_through,
             index: VoxelIndex::default(),
             sparse: FxHashMap::default(),
         }
@@ -62,11 +76,25 @@ impl LocalMap {
 
     /// Whether the surface around a point goes on beyond its nearest neighbours: those may all lie on one scan line,
     /// which in a corner lies in a plane of its own that is none of the scene's.
-    pub fn goes_on(&self, number: u32, found: &mut Vec<(f64, u32)>) -> bool {
-        self.index.nearest_k(&self.points, self.points[number as usize], SURROUNDING, found);
-        let around: Vec<Vector3<f64>> =
-            found.iter().map(|(_, index)| self.points[*index as usize].into()).collect();
-        surface_goes_on(&around)
+    pub fn goes_on(&self, number: u32) -> bool {
+        *self.goes_on[number as usize].get_or_init(|| {
+            let mut found = Vec::new();
+            self.index.nearest_k(&self.points, self.points[number as usize], SURROUNDING, &mut found);
+            let around: Vec<Vector3<f64>> =
+                found.iter().map(|(_, index)| self.points[*index as usize].into()).collect();
+            surface_goes_on(&around)
+        })
+    }
+
+    /// Adds another map's points where they are after a motion.
+    pub fn add_moved(&mut self, other: &Self, motion: &RigidTransform) {
+        let mut of_scans: BTreeMap<u32, Vec<[f64; 3]>> = BTreeMap::new();
+        for (point, scan) in other.points.iter().zip(&other.scans) {
+            of_scans.entry(*scan).or_default().push(motion.transform_point(*point));
+        }
+        for (scan, points) in of_scans {
+            self.add(points, scan);
+        }
     }
 
     pub fn scans(&self) -> &[u32] {
@@ -89,6 +117,14 @@ impl LocalMap {
         }
         self.normals.resize(self.points.len(), [0.0; 3]);
         self.reaches.resize(self.points.len(), f64::INFINITY);
+        self.seen_through.resize(self.points.len(), 0);
+        if self.points.len() > before {
+            // A surface may go on where it did not before.
+            self.goes_on.iter_mut().filter(|known| known.get() == Some(&false)).for_each(|known| {
+                known.take();
+            });
+        }
+        self.goes_on.resize_with(self.points.len(), OnceLock::new);
         self.renew_normals(before);
     }
 
@@ -137,10 +173,25 @@ impl LocalMap {
         });
     }
 
-    /// Takes out what is farther from a point. Far points are sparse, so their normals are poor.
+    /// Counts for each point the scans in a row that looked through it: something that has moved on is no part of the
+    /// map, and goes with the next [`Self::keep_within`]. `to_scan` takes the map to the range image.
+    pub fn look_through(&mut self, image: &SphericalRangeImage, to_scan: &RigidTransform) {
+        self.points.par_iter().zip(&mut self.seen_through).with_min_len(PART).for_each(|(point, count)| {
+            *count = match image.visibility(to_scan.transform_point(*point)) {
+                Visibility::FreeSpace => count.saturating_add(1),
+                Visibility::Confirmed => 0,
+                Visibility::Hidden | Visibility::Unmeasured => *count,
+            };
+        });
+    }
+
+    /// Takes out what is farther from a point, and what scans have looked through. Far points are sparse, so their
+    /// normals are poor.
     pub fn keep_within(&mut self, center: [f64; 3], distance: f64) {
-        let is_near = |point: &[f64; 3]| squared_distance(point, &center) <= distance * distance;
-        let near: Vec<bool> = self.points.iter().map(is_near).collect();
+        let is_near = |(point, through): (&[f64; 3], &u8)| {
+            squared_distance(point, &center) <= distance * distance && *through < self.scans_through
+        };
+        let near: Vec<bool> = self.points.iter().zip(&self.seen_through).map(is_near).collect();
         if near.iter().all(|near| *near) {
             return;
         }
@@ -148,6 +199,8 @@ impl LocalMap {
         keep(&mut self.normals, &near);
         keep(&mut self.scans, &near);
         keep(&mut self.reaches, &near);
+        keep(&mut self.goes_on, &near);
+        keep(&mut self.seen_through, &near);
         self.index = VoxelIndex::default();
         self.sparse.clear();
         for (number, (point, reach)) in (0..).zip(self.points.iter().zip(&self.reaches)) {
@@ -175,7 +228,7 @@ fn cell_of(point: &[f64; 3]) -> [i32; 3] {
     point.map(|c| ((c / CELL).floor() as i32).clamp(i32::MIN + 1, i32::MAX - 1))
 }
 
-fn keep<T: Copy>(values: &mut Vec<T>, kept: &[bool]) {
+fn keep<T>(values: &mut Vec<T>, kept: &[bool]) {
     let mut flags = kept.iter();
     values.retain(|_| flags.next() == Some(&true));
 }
@@ -185,7 +238,6 @@ mod tests {
     use super::*;
     use crate::KdTree;
     use proptest::prelude::*;
-    use std::collections::BTreeMap;
 
     fn map_of(scans: &[Vec<[f64; 3]>]) -> LocalMap {
         let mut map = LocalMap::new(&MapSettings::default());

@@ -7,7 +7,6 @@ use crate::geometry::RigidTransform;
 use crate::statistics::{DEVIATIONS_PER_MEDIAN, median};
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use std::sync::OnceLock;
 
 /// Of the largest eigenvalue, below which a step has no part in a direction.
 const UNDETERMINED: f64 = 1e-8;
@@ -24,13 +23,11 @@ pub(super) struct MapSurface<'a> {
     /// Residual from which on a point is not explained.
     farthest: f64,
     settings: &'a ScanAlignmentSettings,
-    /// Of the map's points that were asked for, whether the surface goes on around them.
-    goes_on: Vec<OnceLock<bool>>,
 }
 
 impl<'a> MapSurface<'a> {
     pub fn new(map: &'a LocalMap, farthest: f64, settings: &'a ScanAlignmentSettings) -> Self {
-        Self { map, farthest, settings, goes_on: vec![OnceLock::new(); map.len()] }
+        Self { map, farthest, settings }
     }
 
     /// A point's distance along the normal of the map's nearest point, and that normal.
@@ -39,8 +36,7 @@ impl<'a> MapSurface<'a> {
         let nearest = self.map.nearest(*point, reach);
         let index = nearest.is_some().then_some(nearest.index)?;
         let normal = Vector3::from(self.map.normal(index)?);
-        let goes_on = self.goes_on[index as usize].get_or_init(|| self.map.goes_on(index, &mut Vec::new()));
-        goes_on.then_some(())?;
+        self.map.goes_on(index).then_some(())?;
         Some((
             normal.dot(&(Vector3::from(*point) - Vector3::from(self.map.points()[index as usize]))),
             normal,

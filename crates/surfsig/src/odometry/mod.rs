@@ -2,38 +2,41 @@
 //!
 //! A scan is thinned ([`thinned_scan`]) by lengths of the first one ([`scale`]), expected where the last motion leads, and
 //! aligned ([`scan_alignment`]) with the map of the surroundings ([`local_map`]). Where it lies there worse than scans
-//! did of late ([`expectation`]), it is searched among keyframes ([`keyframes`]). Along motions that the map
-//! ([`map_surface`]) does not determine, as along a smooth corridor, the last motion goes on. [`tracker`] goes from scan
-//! to scan.
+//! did of late ([`expectation`]), it is searched: by other motions, by rotations of the sensor ([`rotation_search`]), and
+//! among keyframes ([`keyframes`]). Along motions that the map ([`map_surface`]) does not determine, as along a smooth
+//! corridor, the last motion goes on. [`tracker`] goes from scan to scan. Where it stays lost, or the lengths do not
+//! fit, another map is begun ([`segment`], [`segments`]).
 
 mod correspondences;
+mod deskewing;
 mod expectation;
 mod keyframes;
 mod local_map;
 mod map_surface;
+mod pose_covariance;
 mod result;
+mod rotation_search;
 mod scale;
 mod scan_alignment;
+mod segment;
+mod segments;
 mod settings;
 mod thinned_scan;
 mod tracker;
 mod voxel_index;
 
-pub use result::{ScanPose, ScanStatus};
+pub use result::{LoopClosure, ScanPose, ScanStatus};
 pub use settings::{
     ExpectationSettings, MapSettings, OdometrySettings, PredictionSettings, RelocalisationSettings,
-    ScaleSettings, ScanAlignmentSettings,
+    ScaleSettings, ScanAlignmentSettings, SegmentSettings,
 };
 
-use crate::alignment::{FreeDirection, infinite_along, motions_beyond};
-use crate::{Error, RigidTransform, Scan, with_threads};
-use nalgebra::{Matrix6, Vector6};
-use scale::Scale;
-use thinned_scan::{SensorPosition, ThinnedScan};
-use tracker::{LEAST_OPEN, Step, Tracker};
+use crate::{Error, Scan, with_threads};
+use segments::Segments;
+use thinned_scan::SensorPosition;
 
-/// Voxels from the sensor beyond which no point is measured; they are numbered with 32 bits.
-const FARTHEST: f64 = 1e9;
+/// Intervals between scans beyond which a point's time is none.
+const LARGEST_TIME: f64 = 10.0;
 
 /// Follows a sensor from scan to scan.
 ///
@@ -76,7 +79,8 @@ pub struct Odometry {
     /// Where the sensor is in the frame of each scan.
     sensors: Vec<[f64; 3]>,
     poses: Vec<ScanPose>,
-    tracked: Option<Tracked>,
+    segments: Segments,
+    loops: Vec<LoopClosure>,
 }
 
 impl std::fmt::Debug for Odometry {
@@ -87,14 +91,6 @@ impl std::fmt::Debug for Odometry {
     }
 }
 
-/// What there is from the first scan on that has a pose.
-struct Tracked {
-    /// Its number.
-    first: usize,
-    scale: Scale,
-    tracker: Tracker,
-}
-
 impl Odometry {
     /// Begins a sequence.
     ///
@@ -102,14 +98,23 @@ impl Odometry {
     /// [`Error::InvalidLength`] if a length of the settings is not a finite number above 0.
     pub fn new(settings: OdometrySettings) -> Result<Self, Error> {
         settings.check()?;
+        let segments = Segments::new(&settings);
         let sensor_position = SensorPosition::default();
-        Ok(Self { settings, sensor_position, sensors: Vec::new(), poses: Vec::new(), tracked: None })
+        Ok(Self {
+            settings,
+            sensor_position,
+            sensors: Vec::new(),
+            poses: Vec::new(),
+            segments,
+            loops: Vec::new(),
+        })
     }
 
     /// Takes the next scan, in its own frame, in which the sensor is at the viewpoint, or at 0 where none is given.
     ///
-    /// Gives the result of this scan, and before it those of earlier scans that it confirms: where a sensor that was
-    /// lost is found again, poses are kept back until some scans have followed each other. Missing returns that a
+    /// Gives the result of this scan, and before it those of earlier scans that it confirms or disproves: where a sensor
+    /// that was lost is found again, or another map is begun, poses are kept back until some scans have followed each
+    /// other. Missing returns that a
     /// driver wrote as points at 0 count as points, and should be left out before. In scans whose coordinates are those
     /// of a map, where the viewpoint is far from all points, the median of the first scan stands for it.
     ///
@@ -124,7 +129,31 @@ impl Odometry {
     /// # Ok::<(), surfsig::Error>(())
     /// ```
     pub fn push(&mut self, scan: &Scan<'_>) -> Result<Vec<ScanPose>, Error> {
-        with_threads(self.settings.threads, || self.push_here(scan))
+        with_threads(self.settings.threads, || self.push_here(scan, None))
+    }
+
+    /// Takes the next scan of a sensor that moves while it scans: each point has the time at which it was measured, in
+    /// intervals from this scan to the next one, from the time on of which the pose is asked. Points are taken to where
+    /// they would have been measured at that time, by a constant twist that is refined with the pose
+    /// ([`ScanPose::twist`]).
+    ///
+    /// # Errors
+    /// [`Error::Threads`] where the system refuses the threads; [`Error::TimesMismatch`] if there are not as many times
+    /// as points.
+    ///
+    /// ```
+    /// use surfsig::{Odometry, OdometrySettings, PointCloud, Scan};
+    /// let mut odometry = Odometry::new(OdometrySettings::default())?;
+    /// let few = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// assert!(odometry.push_timed(&Scan::new(PointCloud::new(&few)), &[-0.5, 0.5])?[0].twist.is_none());
+    /// assert!(odometry.push_timed(&Scan::new(PointCloud::new(&few)), &[0.0]).is_err());
+    /// # Ok::<(), surfsig::Error>(())
+    /// ```
+    pub fn push_timed(&mut self, scan: &Scan<'_>, times: &[f64]) -> Result<Vec<ScanPose>, Error> {
+        if times.len() != scan.cloud.len() {
+            return Err(Error::TimesMismatch { times: times.len(), points: scan.cloud.len() });
+        }
+        with_threads(self.settings.threads, || self.push_here(scan, Some(times)))
     }
 
     /// The results of all scans so far. One that is lost may still get a pose by the next scans.
@@ -138,7 +167,20 @@ impl Odometry {
         &self.poses
     }
 
-    /// Edge of the voxels in which scans and map are thinned, in the scans' unit; `None` before a scan has points.
+    /// Scans that the sensor has come back with to where it was. Poses of scans on the way around stay as they were given:
+    /// a pose graph distributes the drift over them.
+    ///
+    /// ```
+    /// let odometry = surfsig::Odometry::new(surfsig::OdometrySettings::default())?;
+    /// assert!(odometry.loops().is_empty());
+    /// # Ok::<(), surfsig::Error>(())
+    /// ```
+    pub fn loops(&self) -> &[LoopClosure] {
+        &self.loops
+    }
+
+    /// Edge of the voxels in which scans and the present map are thinned, in the scans' unit; `None` before a scan has
+    /// points.
     ///
     /// ```
     /// let odometry = surfsig::Odometry::new(surfsig::OdometrySettings::default())?;
@@ -146,79 +188,37 @@ impl Odometry {
     /// # Ok::<(), surfsig::Error>(())
     /// ```
     pub fn voxel(&self) -> Option<f64> {
-        self.tracked.as_ref().map(|tracked| tracked.scale.voxel)
+        self.segments.voxel()
     }
 
-    fn push_here(&mut self, scan: &Scan<'_>) -> Vec<ScanPose> {
+    fn push_here(&mut self, scan: &Scan<'_>, times: Option<&[f64]>) -> Vec<ScanPose> {
         let farthest = self.settings.scale.farthest_viewpoint;
-        let (mut points, sensor) = self.sensor_position.about_sensor(scan, farthest);
+        // A time that nobody knows is that of the pose.
+        let known = |time: &f64| if time.abs() <= LARGEST_TIME { *time } else { 0.0 };
+        let times: Option<Vec<f64>> = times.map(|times| times.iter().map(known).collect());
+        let (measured, sensor) = self.sensor_position.about_sensor(scan, times.as_deref(), farthest);
+        let points = &measured.points;
         let number = self.poses.len();
         self.sensors.push(sensor);
-        self.poses.push(ScanPose::none(number, ScanStatus::TooFewPoints));
-        let min_points = self.settings.scale.min_points;
-        let is_usable = points.len() >= min_points && points.iter().any(|point| *point != points[0]);
-        if is_usable && self.tracked.is_none() {
-            let scale = Scale::new(&points, self.settings.voxel, &self.settings.scale);
-            let tracker = Tracker::new(&self.settings, &scale);
-            self.tracked = Some(Tracked { first: number, scale, tracker });
+        let is_usable =
+            points.len() >= self.settings.scale.min_points && points.iter().any(|point| *point != points[0]);
+        let followed = self.segments.follow(is_usable.then_some(measured));
+        let status = if followed.is_thin { ScanStatus::TooFewPoints } else { ScanStatus::Lost };
+        self.poses.push(ScanPose::none(number, status));
+        self.loops.extend(followed.loops.iter().map(|found| found.in_frames(&self.sensors)));
+        let mut changed = followed.disproved;
+        for index in &changed {
+            self.poses[*index] = ScanPose::none(*index, ScanStatus::Lost);
         }
-        let Some(tracked) = &mut self.tracked else { return vec![self.poses[number].clone()] };
-        let per_voxel = 1.0 / tracked.scale.voxel;
-        points.iter_mut().for_each(|point| *point = point.map(|c| c * per_voxel));
-        points.retain(|point| point.iter().all(|c| c.abs() < FARTHEST));
-        let scan = is_usable.then(|| ThinnedScan::new(points, &self.settings));
-        let Some(scan) = scan.filter(|scan| scan.points.len() >= min_points) else {
-            tracked.tracker.skip();
-            return vec![self.poses[number].clone()];
-        };
-        self.poses[number].status = ScanStatus::Lost;
-        let mut changed = Vec::new();
-        for step in tracked.tracker.follow(&scan) {
-            let index = tracked.first + step.number;
-            let sensors = [self.sensors[index], self.sensors[tracked.first]];
-            self.poses[index] =
-                in_frames(&step, index, sensors, tracked.scale.voxel, tracked.scale.median_range);
-            changed.push(index);
+        for found in followed.found {
+            let pose = found.in_frames(&self.sensors);
+            changed.push(pose.scan);
+            let index = pose.scan;
+            self.poses[index] = pose;
         }
-        if changed.last() != Some(&number) {
-            changed.push(number);
-        }
+        changed.push(number);
+        changed.sort_unstable();
+        changed.dedup();
         changed.into_iter().map(|index| self.poses[index].clone()).collect()
-    }
-}
-
-/// From voxels about the sensor to the scan's own unit and frame, and to the map's: the frame of the first scan.
-/// `sensors` are the scan's and the first one's; `unit` is the length by which a rotation moves points.
-fn in_frames(step: &Step, scan: usize, sensors: [[f64; 3]; 2], voxel: f64, unit: f64) -> ScanPose {
-    let to = |translation: [f64; 3]| RigidTransform::from_rotation_vector([0.0; 3], translation);
-    let mut pose = step.T_map_scan;
-    pose.translation *= voxel;
-    let from_sensor = to(sensors[0]);
-    // A twist about the sensor, in voxels, as one in the scan's frame.
-    let adjoint = from_sensor.adjoint();
-    let carried = Matrix6::from_fn(|i, j| adjoint[i][j] * if j < 3 { 1.0 } else { voxel });
-    let both = step.covariance.random + step.covariance.systematic;
-    let open: Vec<Vector6<f64>> = motions_beyond(&step.covariance.open, LEAST_OPEN, unit / voxel)
-        .iter()
-        .map(|motion| carried * motion)
-        .collect();
-    let covariance = infinite_along(&(carried * both * carried.transpose()), &open, unit);
-    let in_unit = |direction: &FreeDirection| match *direction {
-        FreeDirection::Translation { axis } => FreeDirection::Translation { axis },
-        FreeDirection::Rotation { axis, point } => {
-            FreeDirection::Rotation { axis, point: point.map(|c| c * voxel) }
-        }
-        FreeDirection::RotationAboutPoint { point } => {
-            FreeDirection::RotationAboutPoint { point: point.map(|c| c * voxel) }
-        }
-    };
-    let free = step.free_directions.iter().map(|direction| in_unit(direction).transformed(&from_sensor));
-    ScanPose {
-        scan,
-        T_map_scan: Some(to(sensors[1]) * pose * from_sensor.inverse()),
-        covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
-        free_directions: free.collect(),
-        status: step.status,
-        overlap: step.overlap,
     }
 }

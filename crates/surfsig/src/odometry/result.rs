@@ -37,7 +37,7 @@ impl ScanStatus {
     }
 }
 
-/// A scan's pose in the map, whose frame is that of the first scan that has one.
+/// A scan's pose in the map of its segment, whose frame is that of the segment's first scan.
 ///
 /// ```
 /// use surfsig::{Odometry, OdometrySettings, PointCloud, Scan, ScanStatus};
@@ -53,6 +53,9 @@ impl ScanStatus {
 pub struct ScanPose {
     /// The scan's number, from 0.
     pub scan: usize,
+    /// Number of the map that the pose is in, from 0: where a sensor stays lost, another map is begun, whose frame is
+    /// that of its first scan. Poses in different segments have no known relation.
+    pub segment: usize,
     /// Takes the scan's points to the map; `None` where the scan has no pose.
     pub T_map_scan: Option<RigidTransform>,
     /// Of the twist m (rotation vector in radians, then translation) in the scan's own axes by which the pose is off:
@@ -67,6 +70,9 @@ pub struct ScanPose {
     pub status: ScanStatus,
     /// Share of the scan's points that lie on the map; 0 where there is no pose.
     pub overlap: f64,
+    /// Twist (rotation vector in radians, then translation) in the scan's own axes by which the sensor moves from this
+    /// scan to the next one, if its motion goes on; `None` where the times of points are not known.
+    pub twist: Option<[f64; 6]>,
 }
 
 impl ScanPose {
@@ -74,11 +80,34 @@ impl ScanPose {
     pub(super) fn none(scan: usize, status: ScanStatus) -> Self {
         Self {
             scan,
+            segment: 0,
             T_map_scan: None,
             covariance: [[f64::NAN; 6]; 6],
             free_directions: Vec::new(),
             status,
             overlap: 0.0,
+            twist: None,
         }
     }
+}
+
+/// A scan that lies on what an earlier one saw, after a way around: two poses of the scan, of which the difference is what
+/// that way has drifted by. The scan's own [`ScanPose`] is that by the earlier one.
+///
+/// ```
+/// let odometry = surfsig::Odometry::new(surfsig::OdometrySettings::default())?;
+/// assert!(odometry.loops().is_empty());
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+#[allow(non_snake_case)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoopClosure {
+    /// The scan's number, from 0.
+    pub scan: usize,
+    /// The earlier scan's.
+    pub earlier: usize,
+    /// Takes the scan's points to the earlier one.
+    pub T_earlier_scan: RigidTransform,
+    /// Takes the scan's points to the map, by the way around.
+    pub T_map_scan_before: RigidTransform,
 }

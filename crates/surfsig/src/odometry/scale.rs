@@ -54,7 +54,7 @@ pub(super) fn distances(points: &[[f64; 3]], from: [f64; 3]) -> Vec<f64> {
 
 /// The edge of which the points fill as many voxels as are wanted, by halving the interval of its logarithm.
 fn edge_of_voxels(points: &[[f64; 3]], settings: &ScaleSettings) -> f64 {
-    let wanted = settings.voxels_of_scan.min(settings.largest_filled_share * points.len() as f64);
+    let wanted = settings.wanted(points.len());
     let extent = |k: usize| {
         let coordinates = points.iter().map(|point| point[k]);
         coordinates.clone().fold(f64::NEG_INFINITY, f64::max) - coordinates.fold(f64::INFINITY, f64::min)

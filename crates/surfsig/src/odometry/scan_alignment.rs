@@ -1,6 +1,7 @@
 //! A scan aligned with the map: GICP, the last steps point to plane, and how well it then lies.
 
 use super::correspondences::Correspondences;
+use super::deskewing::{MotionWithin, joint_step, moved_slightly};
 use super::local_map::LocalMap;
 use super::map_surface::MapSurface;
 use super::settings::ScanAlignmentSettings;
@@ -30,16 +31,36 @@ pub(super) struct ScanAlignment {
     pub covariance: Matrix6<f64>,
     /// What errs alike over large parts of the scan, likewise.
     pub systematic: Matrix6<f64>,
-    /// Share of the scan's points that lie on the map's surface.
+    /// Points of the scan.
+    pub count: usize,
+    /// Share of them that lie on the map's surface.
     pub overlap: f64,
     /// Share of the map's points in free space, of those that the sensor would have measured.
     pub free_space: f64,
+    /// Share of the scan's points that earlier scans would have measured.
+    pub known: f64,
     /// Share of the scan's points that the map lacks, of those that earlier scans would have measured.
     pub unexplained: f64,
     /// Motions that the map does not determine, in the scan's coordinates.
     pub free_directions: Vec<FreeDirection>,
     /// The scans that the map's points on which it lies came from, each with its share of them.
     pub scans: Vec<(u32, f64)>,
+    /// How the sensor moved within the scan, where the times of its points are known, and where these then are.
+    pub within: Option<(Vector6<f64>, Vec<[f64; 3]>)>,
+}
+
+impl ScanAlignment {
+    /// Standard deviation of the pose along the motions that the map determines: the distance by which it may carry
+    /// a point at a range, in voxels.
+    pub fn deviation(&self, range: f64) -> f64 {
+        let twists: Vec<Vector6<f64>> =
+            self.free_directions.iter().flat_map(|direction| direction.twists([0.0; 3])).collect();
+        let free: Matrix6<f64> =
+            orthonormal(&twists, range).iter().map(|motion| motion * motion.transpose()).sum();
+        let kept = Matrix6::identity() - free;
+        let both = lengths(range) * (self.covariance + self.systematic) * lengths(range);
+        (kept * both * kept).trace().max(0.0).sqrt()
+    }
 }
 
 /// Aligns a scan from a pose nearby; `None` where it hardly meets the map. Along motions that the map does not determine
@@ -72,13 +93,20 @@ pub(super) fn align<F: Fn([f64; 3]) -> bool>(
     }
     let mut correspondences = Correspondences::new(scan.points.len());
     for _ in 0..settings.plane_steps {
-        let plane = PointToPlane::new(scan, map, &pose, &mut correspondences, settings)?;
+        let plane = PointToPlane::new(&scan.points, map, &pose, &mut correspondences, settings)?;
         pose = pose * plane.step();
     }
+    let within = match &scan.motion {
+        Some(motion) => {
+            Some(refined_within(&scan.points, motion, map, &mut pose, &mut correspondences, settings)?)
+        }
+        None => None,
+    };
+    let points = within.as_ref().map_or(&scan.points, |(_, points)| points);
     // Products of rotations are rotations but for rounding, which would grow with the trajectory.
     pose = RigidTransform::from_matrix(&pose.to_matrix()).unwrap_or(pose);
-    let mut plane = PointToPlane::new(scan, map, &pose, &mut correspondences, settings)?;
-    let free_directions = plane.free_directions(scan, map, &pose, settings);
+    let mut plane = PointToPlane::new(points, map, &pose, &mut correspondences, settings)?;
+    let free_directions = plane.free_directions(points, map, &pose, settings);
     let twists: Vec<Vector6<f64>> =
         free_directions.iter().flat_map(|direction| direction.twists([0.0; 3])).collect();
     if !twists.is_empty() {
@@ -86,16 +114,16 @@ pub(super) fn align<F: Fn([f64; 3]) -> bool>(
         let fixed = orthonormal(&twists, unit);
         pose = without_motion(&start, &pose, &fixed, unit);
         for _ in 0..settings.constrained_steps {
-            plane = PointToPlane::new(scan, map, &pose, &mut correspondences, settings)?;
+            plane = PointToPlane::new(points, map, &pose, &mut correspondences, settings)?;
             plane.fix(&fixed, unit);
             pose = pose * plane.step();
         }
-        plane = PointToPlane::new(scan, map, &pose, &mut correspondences, settings)?;
+        plane = PointToPlane::new(points, map, &pose, &mut correspondences, settings)?;
         plane.fix(&fixed, unit);
     }
     let is_known = would_be_known(&pose);
     let (mut known, mut lacking) = (0_usize, 0_usize);
-    for (point, explained) in scan.points.iter().zip(&plane.explained) {
+    for (point, explained) in points.iter().zip(&plane.explained) {
         let is_known = is_known(*point);
         known += usize::from(is_known);
         lacking += usize::from(is_known && !explained);
@@ -108,12 +136,43 @@ pub(super) fn align<F: Fn([f64; 3]) -> bool>(
         T_map_scan: pose,
         covariance,
         systematic,
+        count: scan.points.len(),
         overlap: plane.on_map as f64 / scan.points.len() as f64,
         free_space: scan.range_image.free_space_share(samples),
+        known: known as f64 / scan.points.len() as f64,
         unexplained: lacking as f64 / known.max(1) as f64,
         free_directions,
         scans: plane.shares_of_scans(map),
+        within,
     })
+}
+
+/// Refines pose and motion within the scan at once: the twist, and where the points then are.
+fn refined_within(
+    points: &[[f64; 3]],
+    expected: &MotionWithin,
+    map: &LocalMap,
+    pose: &mut RigidTransform,
+    correspondences: &mut Correspondences,
+    settings: &ScanAlignmentSettings,
+) -> Option<(Vector6<f64>, Vec<[f64; 3]>)> {
+    let mut motion = expected.clone();
+    let mut moved = points.to_vec();
+    for _ in 0..settings.deskew_steps {
+        let plane = PointToPlane::new(&moved, map, pose, correspondences, settings)?;
+        let times = plane.numbers.iter().map(|number| expected.times[*number as usize]);
+        let Some((step, change)) =
+            joint_step(&plane.design, &plane.residuals, times, &motion, &expected.at_pose(pose))
+        else {
+            break;
+        };
+        *pose = *pose * RigidTransform::exp(step.into());
+        motion.twist += change;
+        for (point, time) in moved.iter_mut().zip(&expected.times) {
+            *point = moved_slightly(*point, &(change * *time));
+        }
+    }
+    Some((motion.twist, moved))
 }
 
 /// A pose without the part of its motion from a start that is along unit motions, which have rotations in units of
@@ -137,6 +196,8 @@ struct PointToPlane {
     residuals: Vec<f64>,
     /// The scan's points.
     points: Vec<[f64; 3]>,
+    /// Their numbers.
+    numbers: Vec<u32>,
     /// Numbers of the map's points.
     targets: Vec<u32>,
     /// For each point of the scan, whether the map has it.
@@ -152,13 +213,13 @@ struct PointToPlane {
 impl PointToPlane {
     /// `None` where inliers are too few.
     fn new(
-        scan: &ThinnedScan,
+        points: &[[f64; 3]],
         map: &LocalMap,
         pose: &RigidTransform,
         correspondences: &mut Correspondences,
         settings: &ScanAlignmentSettings,
     ) -> Option<Self> {
-        let found = correspondences.update(map, &scan.points, pose, settings.max_point_distance);
+        let found = correspondences.update(map, points, pose, settings.max_point_distance);
         // The residual r = n (p - q) of a moved point p and the map's point q with its normal n, where it has one.
         let residual = |index: u32, point: &[f64; 3]| {
             let moved = Vector3::from(pose.transform_point(*point));
@@ -167,7 +228,7 @@ impl PointToPlane {
         };
         let residuals: Vec<Option<f64>> = found
             .iter()
-            .zip(&scan.points)
+            .zip(points)
             .map(|(other, point)| other.and_then(|(index, _)| residual(index, point)))
             .collect();
         let sizes: Vec<f64> = residuals.iter().flatten().map(|residual| residual.abs()).collect();
@@ -178,6 +239,7 @@ impl PointToPlane {
             design: Vec::with_capacity(found.len()),
             residuals: Vec::with_capacity(found.len()),
             points: Vec::with_capacity(found.len()),
+            numbers: Vec::with_capacity(found.len()),
             targets: Vec::with_capacity(found.len()),
             explained: Vec::with_capacity(found.len()),
             on_map: 0,
@@ -186,7 +248,7 @@ impl PointToPlane {
             limit,
         };
         let to_scan = pose.inverse();
-        for ((other, residual), point) in found.iter().zip(&residuals).zip(&scan.points) {
+        for (number, ((other, residual), point)) in (0..).zip(found.iter().zip(&residuals).zip(points)) {
             let is_beside = other.is_some_and(|(_, squared)| squared < beside);
             let is_inlier = residual.map(|residual| residual.abs() < limit);
             plane
@@ -202,6 +264,7 @@ impl PointToPlane {
             plane.design.push([torque.x, torque.y, torque.z, normal.x, normal.y, normal.z]);
             plane.residuals.push(residual);
             plane.points.push(*point);
+            plane.numbers.push(number);
             plane.targets.push(index);
         }
         if plane.residuals.len() < settings.min_correspondences {
@@ -256,16 +319,14 @@ impl PointToPlane {
     /// Motions of the scan, in its coordinates, that the map does not determine.
     fn free_directions(
         &self,
-        scan: &ThinnedScan,
+        scan: &[[f64; 3]],
         map: &LocalMap,
         pose: &RigidTransform,
         settings: &ScanAlignmentSettings,
     ) -> Vec<FreeDirection> {
         let rivals_settings = settings.rivals;
-        let some: Vec<[f64; 3]> = some_of(scan.points.len(), rivals_settings.points)
-            .into_iter()
-            .map(|number| scan.points[number])
-            .collect();
+        let some: Vec<[f64; 3]> =
+            some_of(scan.len(), rivals_settings.points).into_iter().map(|number| scan[number]).collect();
         let rivals = Rivals {
             surface: MapSurface::new(map, self.limit, settings),
             source: &some,

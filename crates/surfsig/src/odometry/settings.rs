@@ -1,5 +1,9 @@
 //! All that odometry is told: each number once, with its unit, its meaning and its reason.
 
+mod relocalisation;
+
+pub use relocalisation::{RelocalisationSettings, SegmentSettings};
+
 use crate::Error;
 use crate::alignment::RivalSettings;
 use crate::visibility::RangeImageSettings;
@@ -42,6 +46,8 @@ pub struct OdometrySettings {
     pub prediction: PredictionSettings,
     /// When a pose is doubted, and when it is believed.
     pub expectation: ExpectationSettings,
+    /// When another map is begun.
+    pub segments: SegmentSettings,
     /// How a sensor that was lost is found again.
     pub relocalisation: RelocalisationSettings,
     /// What a scan looked through; lengths in voxels.
@@ -83,6 +89,13 @@ pub struct ScaleSettings {
     /// Median distances of the first scan's points from their median beyond which a sensor is not believed to be at
     /// the viewpoint: the scan is then in coordinates of a map, and its median stands for the sensor.
     pub farthest_viewpoint: f64,
+}
+
+impl ScaleSettings {
+    /// Voxels that a scan of so many points should fill.
+    pub(super) fn wanted(&self, points: usize) -> f64 {
+        self.voxels_of_scan.min(self.largest_filled_share * points as f64)
+    }
 }
 
 impl Default for ScaleSettings {
@@ -133,6 +146,11 @@ pub struct ScanAlignmentSettings {
     pub rival_steps: usize,
     /// Steps point to plane once it is known which motions the map does not determine.
     pub constrained_steps: usize,
+    /// Steps point to plane that refine the pose and the motion within a scan at once, where times are known.
+    pub deskew_steps: usize,
+    /// Standard deviation, in voxels, of the twist within a scan that its pose and those before it tell, from scan to scan
+    /// and at the median range: small enough to count as much as thousands of points do.
+    pub deskew_deviation: f64,
     /// Correspondences without which there is no pose.
     pub min_correspondences: usize,
     /// Points of the map, at most, that are looked up in the scan's range image: their share needs no more.
@@ -156,6 +174,8 @@ impl Default for ScanAlignmentSettings {
             rival_radius: 8.0,
             rival_steps: 8,
             constrained_steps: 3,
+            deskew_steps: 3,
+            deskew_deviation: 0.01,
             min_correspondences: 30,
             free_space_samples: 8000,
         }
@@ -178,6 +198,9 @@ pub struct MapSettings {
     /// Range of the map over the distance within which 99 in 100 points of a scan are: what the next scans see must be
     /// in it.
     pub range_factor: f64,
+    /// Scans in a row that look through a point of the map after which it is taken out, as what has moved on: one
+    /// alone may have a wrong pixel or pose.
+    pub scans_through: u8,
 }
 
 impl Default for MapSettings {
@@ -188,6 +211,7 @@ impl Default for MapSettings {
             min_translation: 1.0,
             min_rotation: 0.03,
             range_factor: 1.2,
+            scans_through: 2,
         }
     }
 }
@@ -228,14 +252,20 @@ impl Default for PredictionSettings {
 pub struct ExpectationSettings {
     /// Scans that the expectation is taken from.
     pub scans: usize,
-    /// Share of the expected overlap (their median) below which a pose is doubted.
+    /// Share of the expected overlap (their median, less what no earlier scan would have measured) below which a pose is
+    /// doubted.
     pub doubted_overlap: f64,
     /// Share of the expected overlap from which on a pose that was searched may be believed at once.
     pub certain_overlap: f64,
     /// Expected overlap before any scan has a pose.
     pub first_overlap: f64,
-    /// Overlap of a pose that is believed, at least.
+    /// Overlap of a pose that is believed, at least, as a share of the points that earlier scans would have measured:
+    /// where sight opens, most of a scan is new.
     pub min_overlap: f64,
+    /// Share of all points that must lie on the map, at least.
+    pub least_overlap: f64,
+    /// Standard deviation of a pose that is believed, at most: in voxels, at the median range.
+    pub max_deviation: f64,
     /// Share of the map's points in sight that are in free space, above the expected share (the median), from which on
     /// scan and map contradict each other.
     pub free_space_excess: f64,
@@ -248,6 +278,13 @@ pub struct ExpectationSettings {
     pub departed_excess: f64,
     /// The excess of unexplained points up to which a scan at its expected pose is believed: something has come.
     pub arrived_excess: f64,
+    /// Distance between the expected and the found pose, in voxels at the median range, up to which more may have left
+    /// and come: a sensor that was carried away is not seen there by chance.
+    pub near: f64,
+    /// The excess in free space up to which a scan so near to its expected pose is believed, as where lorries pass.
+    pub departed_excess_near: f64,
+    /// The excess of unexplained points, likewise.
+    pub arrived_excess_near: f64,
 }
 
 impl Default for ExpectationSettings {
@@ -258,59 +295,16 @@ impl Default for ExpectationSettings {
             certain_overlap: 0.93,
             first_overlap: 0.4,
             min_overlap: 0.4,
+            least_overlap: 0.1,
+            max_deviation: 0.5,
             free_space_excess: 0.01,
             unexplained_excess: 0.015,
             certain_unexplained: 0.02,
             departed_excess: 0.05,
             arrived_excess: 0.2,
-        }
-    }
-}
-
-/// How a sensor that was lost is found again: among keyframes, by the signatures of their keypoints.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RelocalisationSettings {
-    /// Distance between keyframes, in median ranges.
-    pub keyframe_distance: f64,
-    /// Rotation between keyframes nearer than that, in radians.
-    pub keyframe_rotation: f64,
-    /// Keyframes that are searched, at most, the latest first.
-    pub max_keyframes: usize,
-    /// Matches that agree with a pose that is tried, at least.
-    pub min_matches: usize,
-    /// Poses that are tried on the keyframes' map, at most, those first that most matches agree with.
-    pub max_trials: usize,
-    /// Edge of the voxels of which keypoints are described, in voxels of the map: signatures need more points than a
-    /// pose does.
-    pub detail_voxel: f64,
-    /// Keyframes next to a pose that say what they would have seen.
-    pub observers: usize,
-    /// Largest distance of corresponding points in the first round, in voxels: so far off may a pose be that matches
-    /// propose.
-    pub max_correspondence_distance: f64,
-    /// Overlap by which a pose that was searched must exceed a doubted one, to take its place.
-    pub overlap_gain: f64,
-    /// Scans that must follow each other through a part of the map that was searched, where none alone is certain:
-    /// parts that look alike from one viewpoint differ a little farther on.
-    pub scans_on_trial: usize,
-    /// The same, where the sensor is seen again at its last pose.
-    pub scans_on_trial_there: usize,
-}
-
-impl Default for RelocalisationSettings {
-    fn default() -> Self {
-        Self {
-            keyframe_distance: 0.3,
-            keyframe_rotation: 30.0_f64.to_radians(),
-            max_keyframes: 50,
-            min_matches: 24,
-            max_trials: 3,
-            detail_voxel: 0.5,
-            observers: 4,
-            max_correspondence_distance: 4.0,
-            overlap_gain: 0.1,
-            scans_on_trial: 3,
-            scans_on_trial_there: 2,
+            near: 0.67,
+            departed_excess_near: 0.3,
+            arrived_excess_near: 0.4,
         }
     }
 }

@@ -1,19 +1,22 @@
 //! A scan as it is aligned: thinned, about its sensor, in voxels.
 
+use super::deskewing::{MeasuredScan, MotionWithin, deskewed};
 use super::scale::{distances, median_point};
 use super::settings::OdometrySettings;
 use crate::Scan;
 use crate::alignment::GicpCloud;
 use crate::statistics::median;
 use crate::visibility::SphericalRangeImage;
-use crate::voxels::voxel_means;
+use crate::voxels::{Voxels, voxel_means};
+use nalgebra::Vector6;
 
 /// Coordinates beyond which the square of a distance leaves float64.
 const FARTHEST: f64 = 1e150;
 
 /// The points of a scan about its sensor; lengths are in voxels.
+#[derive(Clone)]
 pub(super) struct ThinnedScan {
-    /// All of them.
+    /// All of them, deskewed where their times are known.
     measured: Vec<[f64; 3]>,
     /// The mean of each voxel's points.
     pub points: Vec<[f64; 3]>,
@@ -21,14 +24,41 @@ pub(super) struct ThinnedScan {
     pub coarse: GicpCloud,
     /// How far the sensor saw.
     pub range_image: SphericalRangeImage,
+    /// With the mean time of each voxel's points, where these are known.
+    pub motion: Option<MotionWithin>,
+    /// What was measured, where a scan may be deskewed anew.
+    raw: Option<MeasuredScan>,
 }
 
 impl ThinnedScan {
-    pub fn new(measured: Vec<[f64; 3]>, settings: &OdometrySettings) -> Self {
+    /// `expected` is the motion within the scan, in which times are not looked at.
+    pub fn new(scan: MeasuredScan, expected: MotionWithin, settings: &OdometrySettings) -> Self {
+        let Some(times) = &scan.times else { return Self::of_points(scan.points, None, None, settings) };
+        let measured = deskewed(&scan.points, times, &expected.twist);
+        let voxels = Voxels::new(&measured, 1.0);
+        let sums = voxels.sums(times.iter().map(|time| [*time, 0.0, 0.0]));
+        // Where a voxel has points of several times, their mean moves with the mean of these.
+        let times = sums.iter().zip(&voxels.counts).map(|(sum, count)| sum[0] / f64::from(*count)).collect();
+        let motion = MotionWithin { times, ..expected };
+        Self::of_points(measured, Some(motion), Some(scan), settings)
+    }
+
+    fn of_points(
+        measured: Vec<[f64; 3]>,
+        motion: Option<MotionWithin>,
+        raw: Option<MeasuredScan>,
+        settings: &OdometrySettings,
+    ) -> Self {
         let points = voxel_means(&measured, 1.0);
         let coarse = GicpCloud::new(voxel_means(&points, settings.alignment.coarse_voxel));
         let range_image = SphericalRangeImage::new(&points, settings.range_image);
-        Self { measured, points, coarse, range_image }
+        Self { measured, points, coarse, range_image, motion, raw }
+    }
+
+    /// The same scan with another motion within; `None` where no times are known.
+    pub fn deskewed_anew(&self, twist: Vector6<f64>, settings: &OdometrySettings) -> Option<Self> {
+        let motion = MotionWithin { times: Vec::new(), twist, ..self.motion.clone()? };
+        Some(Self::new(self.raw.clone()?, motion, settings))
     }
 
     /// The means of other voxels.
@@ -45,18 +75,25 @@ pub(super) struct SensorPosition {
 }
 
 impl SensorPosition {
-    /// A scan's points about its sensor, and the sensor's position in the scan's frame: the viewpoint, or 0.
+    /// A scan's points about its sensor, with their times, and the sensor's position in the scan's frame: the viewpoint,
+    /// or 0.
     ///
     /// In the coordinates of a map that is far from all points (a PCD's viewpoint is 0 where nobody set it), and the
     /// median of the first scan stands for it.
-    pub fn about_sensor(&mut self, scan: &Scan<'_>, farthest_viewpoint: f64) -> (Vec<[f64; 3]>, [f64; 3]) {
+    pub fn about_sensor(
+        &mut self,
+        scan: &Scan<'_>,
+        times: Option<&[f64]>,
+        farthest_viewpoint: f64,
+    ) -> (MeasuredScan, [f64; 3]) {
         let Scan { cloud, viewpoint, .. } = scan;
         let viewpoint = viewpoint.filter(|at| at.iter().all(|c| c.abs() < FARTHEST)).unwrap_or([0.0; 3]);
         // Offsets from the origin lose nothing where both are large.
         let offsets = cloud.with_origin([0.0; 3]);
         let is_known = |point: &[f64; 3]| point.iter().all(|c| c.abs() < FARTHEST);
-        let mut points: Vec<[f64; 3]> =
-            (0..cloud.len()).filter_map(|index| offsets.position(index)).filter(is_known).collect();
+        let known = |index: usize| offsets.position(index).filter(is_known).map(|point| (index, point));
+        let (numbers, mut points): (Vec<usize>, Vec<[f64; 3]>) = (0..cloud.len()).filter_map(known).unzip();
+        let times = times.map(|times| numbers.iter().map(|number| times[*number]).collect());
         let from = |sensor: [f64; 3]| [0, 1, 2].map(|k| cloud.origin[k] - sensor[k]);
         if self.substitute.is_none() && !points.is_empty() {
             let middle = median_point(&points);
@@ -73,7 +110,7 @@ impl SensorPosition {
                 point[k] += offset[k];
             }
         }
-        (points, sensor)
+        (MeasuredScan { points, times }, sensor)
     }
 }
 
@@ -92,9 +129,9 @@ mod tests {
         let cloud = PointCloud::new_f64(&points).with_origin([5e5, 5e6, 100.0]);
         let viewpoint = [5e5 + 1.0, 5e6, 100.0];
         let (found, sensor) =
-            SensorPosition::default().about_sensor(&Scan::new(cloud).seen_from(viewpoint), 30.0);
+            SensorPosition::default().about_sensor(&Scan::new(cloud).seen_from(viewpoint), None, 30.0);
         assert_eq!(sensor, viewpoint);
-        assert_eq!(found, around([2.0, 0.0, 1.0]));
+        assert_eq!(found.points, around([2.0, 0.0, 1.0]));
     }
 
     #[test]
@@ -102,21 +139,21 @@ mod tests {
         let points = around([0.0; 3]);
         let mut position = SensorPosition::default();
         let empty = PointCloud::new_f64(&[]);
-        assert_eq!(position.about_sensor(&Scan::new(empty), 30.0).1, [0.0; 3]);
+        assert_eq!(position.about_sensor(&Scan::new(empty), None, 30.0).1, [0.0; 3]);
         let far = PointCloud::new_f64(&points).with_origin([5e5, 0.0, 0.0]);
-        let (found, sensor) = position.about_sensor(&Scan::new(far), 30.0);
-        assert_eq!((found, sensor), (points.clone(), [5e5, 0.0, 0.0]));
+        let (found, sensor) = position.about_sensor(&Scan::new(far), None, 30.0);
+        assert_eq!((found.points, sensor), (points.clone(), [5e5, 0.0, 0.0]));
         // And so it does for the next one.
         let next = far.with_origin([5e5 + 2.0, 0.0, 0.0]);
-        let (found, sensor) = position.about_sensor(&Scan::new(next).seen_from([0.0; 3]), 30.0);
-        assert_eq!((found, sensor), (around([2.0, 0.0, 0.0]), [5e5, 0.0, 0.0]));
+        let (found, sensor) = position.about_sensor(&Scan::new(next).seen_from([0.0; 3]), None, 30.0);
+        assert_eq!((found.points, sensor), (around([2.0, 0.0, 0.0]), [5e5, 0.0, 0.0]));
     }
 
     #[test]
     fn points_without_a_position_are_left_out() {
         let points = [vec![[f64::NAN, 0.0, 0.0], [1e200, 0.0, 0.0]], around([3.0, 0.0, 1.0])].concat();
         let cloud = PointCloud::new_f64(&points);
-        let (found, _) = SensorPosition::default().about_sensor(&Scan::new(cloud), 30.0);
-        assert_eq!(found, points[2..]);
+        let (found, _) = SensorPosition::default().about_sensor(&Scan::new(cloud), None, 30.0);
+        assert_eq!(found.points, points[2..]);
     }
 }

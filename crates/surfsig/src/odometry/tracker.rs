@@ -1,17 +1,26 @@
-//! Scan after scan: predicted, aligned with the map, and searched among keyframes where that fails.
+//! Scan after scan: predicted, aligned with the map, and searched where that fails: by other motions, by rotations, and
+//! among keyframes.
+
+mod loops;
+mod mapping;
+mod motion_within;
+mod relocalisation;
+
+pub(super) use loops::Loop;
 
 use super::expectation::Expectation;
-use super::keyframes::Keyframes;
+use super::keyframes::{Keyframes, Which};
 use super::local_map::LocalMap;
+use super::pose_covariance::Covariance;
 use super::result::ScanStatus;
 use super::scale::{Scale, distances};
 use super::scan_alignment::{ScanAlignment, align};
 use super::settings::OdometrySettings;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
-use crate::alignment::{FreeDirection, orthonormal, unscaled};
+use crate::alignment::FreeDirection;
 use crate::statistics::quantile;
-use nalgebra::{Matrix6, Vector3};
+use nalgebra::Vector6;
 
 /// Share of a scan's points that the map's range is taken from.
 const MOST: f64 = 0.99;
@@ -31,36 +40,8 @@ pub(super) struct Step {
     pub free_directions: Vec<FreeDirection>,
     pub status: ScanStatus,
     pub overlap: f64,
-}
-
-/// What a pose may be off by.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Covariance {
-    /// By chance, in each scan anew.
-    pub random: Matrix6<f64>,
-    /// Alike in all scans.
-    pub systematic: Matrix6<f64>,
-    /// Along motions that nothing determines, in the unknown variance of such a motion: they stay apart from the
-    /// others, so that the small angles between those of several scans do not count.
-    pub open: Matrix6<f64>,
-}
-
-impl Covariance {
-    fn zeros() -> Self {
-        Self { random: Matrix6::zeros(), systematic: Matrix6::zeros(), open: Matrix6::zeros() }
-    }
-
-    /// In other axes.
-    fn carried(&self, transform: &RigidTransform) -> Self {
-        let adjoint = transform.adjoint();
-        let adjoint = Matrix6::from_fn(|row, column| adjoint[row][column]);
-        let carried = |covariance: &Matrix6<f64>| adjoint * covariance * adjoint.transpose();
-        Self {
-            random: carried(&self.random),
-            systematic: carried(&self.systematic),
-            open: carried(&self.open),
-        }
-    }
+    /// From scan to scan, in the sensor's axes at the reference, where the times of points are known.
+    pub twist: Option<Vector6<f64>>,
 }
 
 /// Keeps the map, the motion and the keyframes; lengths are in voxels.
@@ -79,6 +60,10 @@ pub(super) struct Tracker {
     last: RigidTransform,
     /// From a scan to the next one.
     motion: RigidTransform,
+    /// Whether the last two scans have told it.
+    has_motion: bool,
+    /// The motion before, where the last three scans have told both.
+    motion_before: Option<Vector6<f64>>,
     /// Scans since the last one that has a pose.
     since: usize,
     /// Sum of the squared errors of predictions, and their number.
@@ -88,7 +73,19 @@ pub(super) struct Tracker {
     is_lost: bool,
     /// Scans whose poses the next ones have to confirm.
     trial: Vec<Step>,
+    /// Whether the first of them is where the sensor was expected, and has only rotated.
+    trial_is_there: bool,
     last_mapped: Option<RigidTransform>,
+    /// The first scan, until the second one shows how the sensor moved within it.
+    first: Option<ThinnedScan>,
+    /// Scans since the last search.
+    since_search: usize,
+    /// Numbers of the scans up to the last one whose poses were kept though doubted.
+    doubted: Vec<usize>,
+    /// Numbers of the scans whose poses a later one has disproved, until they are asked for.
+    disproved: Vec<usize>,
+    /// Loops that were closed, until they are asked for.
+    loops: Vec<Loop>,
     number: usize,
 }
 
@@ -107,21 +104,61 @@ impl Tracker {
             mapped: Vec::new(),
             last: RigidTransform::identity(),
             motion: RigidTransform::identity(),
+            has_motion: false,
+            motion_before: None,
             since: 1,
             squared_errors: (settings.prediction.first_error * median_range).powi(2),
             predictions: 1.0,
             expectation: Expectation::new(&settings.expectation),
             is_lost: false,
             trial: Vec::new(),
+            trial_is_there: false,
             last_mapped: None,
+            first: None,
+            since_search: usize::MAX,
+            doubted: Vec::new(),
+            disproved: Vec::new(),
+            loops: Vec::new(),
             number: 0,
         }
+    }
+
+    /// Whether poses of the last scans wait for the next ones.
+    pub fn is_on_trial(&self) -> bool {
+        !self.trial.is_empty()
+    }
+
+    /// Ends tracking: only a search finds the sensor again.
+    pub fn leave(&mut self) {
+        self.trial.clear();
+        self.is_lost = true;
+        self.since = self.settings.prediction.max_lost;
+    }
+
+    /// Where the next scan is expected, in the map.
+    pub fn prediction(&self) -> RigidTransform {
+        self.last * power(self.motion, self.since)
+    }
+
+    /// Gives the numbers of scans whose poses the last one has disproved.
+    pub fn take_disproved(&mut self) -> Vec<usize> {
+        std::mem::take(&mut self.disproved)
+    }
+
+    /// From a scan to the next one, in voxels.
+    pub fn motion(&self) -> RigidTransform {
+        self.motion
     }
 
     /// Passes over a scan without a pose.
     pub fn skip(&mut self) {
         self.number += 1;
         self.since += 1;
+        (self.has_motion, self.motion_before) = (false, None);
+        if self.since > self.settings.prediction.max_lost {
+            // Where the sensor went meanwhile, nobody knows.
+            self.motion = RigidTransform::identity();
+        }
     }
 
     /// Finds the pose of the next scan: none if it is lost, and several where it confirms those before.
@@ -137,28 +174,31 @@ impl Tracker {
                 free_directions: Vec::new(),
                 status: ScanStatus::Tracked,
                 overlap: 1.0,
+                twist: None,
             };
-            return self.take(scan, first);
+            self.first = scan.motion.is_some().then(|| scan.clone());
+            return self.take(scan, &scan.points, first);
         }
-        let prediction = self.last * power(self.motion, self.since);
-        let tracked = self.aligned(scan, prediction);
-        let chosen = match tracked {
-            Some(found) if self.expectation.is_met(&found) => Some((found, ScanStatus::Tracked)),
-            doubted => self.relocalised_or_doubted(scan, doubted, &prediction),
+        self.since_search = self.since_search.saturating_add(1);
+        let prediction = self.expected(scan);
+        let first = self.aligned(scan, prediction);
+        let first = first.and_then(|found| self.deskew_first(scan, found));
+        let chosen = match first {
+            Some(found) if self.is_met(&found) => Some((found, ScanStatus::Tracked)),
+            doubted => self.found_elsewhere_or_doubted(scan, doubted, &prediction),
         };
-        let min_overlap = self.settings.expectation.min_overlap;
-        let believed = chosen.filter(|(found, _)| found.overlap >= min_overlap);
-        let Some((found, status)) = believed else {
+        let Some((mut found, status)) = chosen.filter(|(found, _)| self.is_believable(found)) else {
             self.lose();
             return Vec::new();
         };
-        let step = Step {
+        let mut step = Step {
             number: self.number,
             T_map_scan: found.T_map_scan,
             covariance: self.covariance(&found),
             free_directions: found.free_directions.clone(),
             status,
             overlap: found.overlap,
+            twist: found.within.as_ref().map(|(twist, _)| *twist),
         };
         let was_expected = status == ScanStatus::Tracked && !self.is_lost;
         if !was_expected && self.stays_on_trial(&step, &found) {
@@ -171,42 +211,71 @@ impl Tracker {
                 self.predictions += 1.0;
             }
         }
+        self.remember_doubt(&step, &found);
         self.expectation.add(&found);
-        self.take(scan, step)
+        if was_expected
+            && self.doubted.is_empty()
+            && self.keyframes.is_new(&found.T_map_scan)
+            && let Some(there) = self.closed_loop(scan, &found)
+        {
+            step.T_map_scan = there.T_map_scan;
+            step.covariance = self.covariance(&there);
+            found = there;
+        }
+        let points = found.within.as_ref().map_or(&scan.points, |(_, points)| points);
+        self.take(scan, points, step)
     }
 
-    /// The pose found among keyframes, or else the doubted one where it may be kept.
-    fn relocalised_or_doubted(
-        &mut self,
-        scan: &ThinnedScan,
-        doubted: Option<ScanAlignment>,
-        prediction: &RigidTransform,
-    ) -> Option<(ScanAlignment, ScanStatus)> {
-        let is_met =
-            |found: &ScanAlignment| found.free_directions.is_empty() && self.expectation.is_met(found);
-        let searched = self.keyframes.find(scan, self.map_range, is_met);
-        if let Some((found, map)) = searched.filter(|(found, _)| self.is_better(found, doubted.as_ref())) {
-            self.map = map;
-            self.trial.clear();
-            return Some((found, ScanStatus::Relocalised));
+    /// Gives the loops that the last scan has closed.
+    pub fn take_loops(&mut self) -> Vec<Loop> {
+        std::mem::take(&mut self.loops)
+    }
+
+    fn is_met(&self, found: &ScanAlignment) -> bool {
+        self.expectation.is_met(found) && self.is_believable(found)
+    }
+
+    fn is_believable(&self, found: &ScanAlignment) -> bool {
+        self.expectation.is_believable(found, self.median_range)
+    }
+
+    /// Keeps the numbers of doubted poses until one is beyond doubt: if that is found elsewhere, they were wrong.
+    fn remember_doubt(&mut self, step: &Step, found: &ScanAlignment) {
+        let is_elsewhere = self.trial.first().is_some_and(|first| first.status == ScanStatus::Relocalised);
+        if is_elsewhere && !self.trial_is_there {
+            self.disproved = std::mem::take(&mut self.doubted);
+            for number in &self.disproved {
+                if let Some(pose) = self.mapped.get_mut(*number) {
+                    *pose = None;
+                }
+            }
+            self.keyframes.remove(&self.disproved);
+        } else if self.expectation.is_met(found) {
+            self.doubted.clear();
+        } else {
+            self.doubted.push(step.number);
         }
-        let kept = doubted.filter(|found| self.is_expected(found, prediction));
-        kept.map(|found| (found, ScanStatus::Tracked))
     }
 
     fn lose(&mut self) {
         self.skip();
         self.trial.clear();
+        self.trial_is_there = false;
         self.is_lost = true;
-        if self.since > self.settings.prediction.max_lost {
-            // Where the sensor went meanwhile, nobody knows.
-            self.motion = RigidTransform::identity();
-        }
     }
 
     fn aligned(&self, scan: &ThinnedScan, start: RigidTransform) -> Option<ScanAlignment> {
-        let known = |pose: &RigidTransform| self.keyframes.would_have_seen(pose);
-        align(scan, &self.map, start, self.correspondence_distance(), &self.settings.alignment, known)
+        self.aligned_within(scan, start, self.correspondence_distance())
+    }
+
+    fn aligned_within(
+        &self,
+        scan: &ThinnedScan,
+        start: RigidTransform,
+        distance: f64,
+    ) -> Option<ScanAlignment> {
+        let known = |pose: &RigidTransform| self.keyframes.would_have_seen(pose, Which::Loaded);
+        align(scan, &self.map, start, distance, &self.settings.alignment, known)
     }
 
     /// As far as predictions were wrong (KISS-ICP's threshold, Vizzo and others, 2023).
@@ -226,30 +295,28 @@ impl Tracker {
         2.0 * self.median_range * (0.5 * rotation_angle(motion)).sin() + motion.translation.norm()
     }
 
-    /// Whether a pose that was searched takes the place of the doubted one.
-    fn is_better(&self, searched: &ScanAlignment, doubted: Option<&ScanAlignment>) -> bool {
-        let Some(doubted) = doubted.filter(|doubted| doubted.free_directions.is_empty()) else { return true };
-        let apart = self.distance_at_range(&(doubted.T_map_scan.inverse() * searched.T_map_scan));
-        let gain = self.settings.relocalisation.overlap_gain;
-        apart > self.settings.prediction.min_correspondence_distance
-            && (searched.overlap > doubted.overlap + gain || self.expectation.is_contradicted(doubted))
-    }
-
     /// Whether a doubted pose may be kept: it is near where the sensor was expected, which long after it was lost is
     /// nowhere.
     fn is_expected(&self, found: &ScanAlignment, prediction: &RigidTransform) -> bool {
-        let near = self.prediction_error(prediction, found) <= self.correspondence_distance();
+        let error = self.prediction_error(prediction, found);
         let goes_on = !self.is_lost || self.since <= self.settings.prediction.max_lost;
-        near && goes_on && self.expectation.may_be_new(found)
+        // While it is lost, the motion says less.
+        let distance = error * self.since as f64;
+        error <= self.correspondence_distance() && goes_on && self.expectation.may_be_new(found, distance)
     }
 
     /// Keeps back poses in a known part of the map until one is certain or enough have followed each other: parts that
     /// look alike from one viewpoint differ a little farther on.
     fn stays_on_trial(&mut self, step: &Step, found: &ScanAlignment) -> bool {
+        let is_near = self.trial.is_empty() && !self.is_lost && {
+            let moved = step.T_map_scan.translation - self.prediction().translation;
+            moved.norm() <= self.correspondence_distance()
+        };
+        self.trial_is_there |= is_near;
         self.trial.push(step.clone());
         let settings = &self.settings.relocalisation;
         let needed = match self.trial[0].status {
-            ScanStatus::Relocalised => settings.scans_on_trial,
+            ScanStatus::Relocalised if !self.trial_is_there => settings.scans_on_trial,
             _ => settings.scans_on_trial_there,
         };
         self.is_lost = self.trial.len() < needed && !self.expectation.is_certain(found);
@@ -259,86 +326,24 @@ impl Tracker {
         self.is_lost
     }
 
-    /// Adds the error of the map, which is that of the scans that it was made of.
-    fn covariance(&self, found: &ScanAlignment) -> Covariance {
-        let to_scan = found.T_map_scan.inverse();
-        let mut of_map = Covariance::zeros();
-        for &(number, share) in &found.scans {
-            if let Some((pose, of_scan)) = &self.mapped[number as usize] {
-                let carried = of_scan.carried(&(to_scan * *pose));
-                of_map.random += carried.random * share;
-                of_map.systematic += carried.systematic * share;
-                of_map.open += carried.open * share;
-            }
-        }
-        let unit = self.median_range;
-        let mut open = of_map.open;
-        for direction in &found.free_directions {
-            for motion in orthonormal(&direction.twists([0.0; 3]), unit) {
-                let twist = unscaled(&motion, unit);
-                open += twist * twist.transpose();
-            }
-        }
-        let random = found.covariance + of_map.random;
-        Covariance { random, systematic: sum_of_alike(&found.systematic, &of_map.systematic, unit), open }
-    }
-
-    /// Puts a scan into the map, and gives its step after those that it confirms.
-    fn take(&mut self, scan: &ThinnedScan, step: Step) -> Vec<Step> {
-        self.go_on(&step);
-        let pose = step.T_map_scan;
-        let steps = if self.trial.is_empty() { vec![step] } else { std::mem::take(&mut self.trial) };
-        if steps[0].status == ScanStatus::Relocalised {
-            self.last_mapped = None;
-        }
-        let Some(step) = steps.last().filter(|_| self.has_moved(&pose)) else { return steps };
-        let number = step.number as u32;
-        // First of all what leaves: new points need no normals that are made with it.
-        self.map.keep_within(pose.translation.into(), self.map_range);
-        let is_near = |point: &&[f64; 3]| Vector3::from(**point).norm() <= self.map_range;
-        let near = scan.points.iter().filter(is_near).map(|point| pose.transform_point(*point));
-        self.map.add(near, number);
-        self.mapped.resize(step.number + 1, None);
-        self.mapped[step.number] = Some((pose, step.covariance));
-        self.keyframes.offer(scan, &pose, number);
-        self.last_mapped = Some(pose);
-        steps
-    }
-
     /// Expects the next scan from here, with the motion since the last one.
     fn go_on(&mut self, step: &Step) {
-        if step.status == ScanStatus::Relocalised {
+        let moved = self.last.inverse() * step.T_map_scan;
+        // A sensor that was found again far off has been carried there, which it does not go on to be.
+        let is_carried = step.status == ScanStatus::Relocalised
+            && moved.translation.norm() > self.correspondence_distance() + self.motion.translation.norm();
+        self.motion_before = None;
+        if is_carried {
             self.motion = RigidTransform::identity();
         } else if self.since == 1 {
-            self.motion = self.last.inverse() * step.T_map_scan;
+            self.motion_before = self.has_motion.then(|| Vector6::from(self.motion.log()));
+            self.has_motion = self.number > 0;
+            self.motion = moved;
         }
         self.last = step.T_map_scan;
         self.since = 1;
         self.number += 1;
     }
-
-    /// Whether the sensor went on since the last scan of the map.
-    fn has_moved(&self, pose: &RigidTransform) -> bool {
-        let settings = &self.settings.map;
-        self.last_mapped.is_none_or(|last| {
-            let since = last.inverse() * *pose;
-            since.translation.norm() > settings.min_translation
-                || rotation_angle(&since) > settings.min_rotation
-        })
-    }
-}
-
-/// The covariance of a sum whose parts may err alike: the least one that none of their correlations exceeds in trace, with
-/// rotations in units of `unit`.
-fn sum_of_alike(one: &Matrix6<f64>, other: &Matrix6<f64>, unit: f64) -> Matrix6<f64> {
-    let size = |covariance: &Matrix6<f64>| {
-        (0..6).map(|k| covariance[(k, k)] * if k < 3 { unit * unit } else { 1.0 }).sum::<f64>().sqrt()
-    };
-    let (of_one, of_other) = (size(one), size(other));
-    if of_one == 0.0 || of_other == 0.0 {
-        return one + other;
-    }
-    one * (1.0 + of_other / of_one) + other * (1.0 + of_one / of_other)
 }
 
 /// The motion of several steps.
@@ -355,14 +360,6 @@ pub(super) fn rotation_angle(motion: &RigidTransform) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn parts_that_err_alike_add_up_before_they_are_squared() {
-        let one = Matrix6::identity() * 0.04;
-        let sum = sum_of_alike(&one, &(one * 9.0), 5.0);
-        assert!((sum - Matrix6::identity() * 0.64).amax() < 1e-12, "0.2 + 0.6, squared");
-        assert_eq!(sum_of_alike(&one, &Matrix6::zeros(), 5.0), one);
-    }
 
     #[test]
     fn a_motion_that_goes_on_is_repeated() {

@@ -1,0 +1,237 @@
+//! The maps of a sequence: the present one, one on trial beside it, and those before.
+
+use super::deskewing::{MeasuredScan, MotionWithin};
+use super::pose_covariance::Covariance;
+use super::segment::{FoundLoop, FoundPose, Segment};
+use super::settings::OdometrySettings;
+use super::tracker::Step;
+use crate::RigidTransform;
+use nalgebra::Vector6;
+
+/// What a scan has led to.
+#[derive(Default)]
+pub(super) struct Followed {
+    /// Poses of this scan and of earlier ones.
+    pub found: Vec<FoundPose>,
+    /// Scans whose poses were wrong.
+    pub disproved: Vec<usize>,
+    /// Loops that the scan has closed, about the sensors.
+    pub loops: Vec<FoundLoop>,
+    /// Whether too little of the scan was left to align it.
+    pub is_thin: bool,
+}
+
+/// The last scan with a pose before another map was begun; lengths are in the scans' unit.
+#[allow(non_snake_case)]
+struct Anchor {
+    scan: usize,
+    measured: MeasuredScan,
+    T_world_sensor: RigidTransform,
+    covariance: Covariance,
+    /// From this scan to the next one.
+    motion: [f64; 6],
+}
+
+/// A map on trial, and the steps through it.
+struct Candidate {
+    segment: Segment,
+    steps: Vec<Step>,
+}
+
+/// The maps of a sequence.
+pub(super) struct Segments {
+    settings: OdometrySettings,
+    /// The present one is the last.
+    segments: Vec<Segment>,
+    candidate: Option<Candidate>,
+    anchor: Option<Anchor>,
+    /// Scans so far.
+    count: usize,
+    /// Worlds so far.
+    worlds: usize,
+    /// Scans so far that were searched in a past map.
+    searched: usize,
+}
+
+impl Segments {
+    pub fn new(settings: &OdometrySettings) -> Self {
+        Self {
+            settings: settings.clone(),
+            segments: Vec::new(),
+            candidate: None,
+            anchor: None,
+            count: 0,
+            worlds: 0,
+            searched: 0,
+        }
+    }
+
+    /// Edge of the voxels of the present map.
+    pub fn voxel(&self) -> Option<f64> {
+        self.segments.last().map(|segment| segment.scale.voxel)
+    }
+
+    /// Takes the next scan, if it is one.
+    pub fn follow(&mut self, scan: Option<MeasuredScan>) -> Followed {
+        let number = self.count;
+        self.count += 1;
+        let Some(measured) = scan else {
+            self.segments.iter_mut().for_each(|segment| drop(segment.follow(None)));
+            self.candidate = None;
+            return Followed { is_thin: true, ..Followed::default() };
+        };
+        if self.segments.is_empty() {
+            let segment = Segment::new(self.worlds, number, &measured.points, &self.settings);
+            if segment.thinned(&measured, &self.settings).is_none() {
+                return Followed { is_thin: true, ..Followed::default() };
+            }
+            self.segments.push(segment);
+            self.worlds += 1;
+        }
+        let count = self.segments.len();
+        let (past, present) = self.segments.split_at_mut(count - 1);
+        let segment = &mut present[0];
+        let scan = segment.thinned(&measured, &self.settings);
+        let mut followed = Followed { is_thin: scan.is_none(), ..Followed::default() };
+        let is_unfit = segment.is_unfit(scan.as_ref(), measured.points.len(), &self.settings);
+        let steps = segment.follow(scan.as_ref());
+        followed.disproved =
+            segment.tracker.take_disproved().into_iter().map(|step| segment.first + step).collect();
+        followed.found = steps.iter().map(|step| segment.found(step)).collect();
+        followed.loops = segment.take_loops();
+        let returned = steps.is_empty().then(|| search_past(past, &measured, self.searched, &self.settings));
+        if returned.is_none() {
+            past.iter_mut().for_each(|segment| segment.tracker.skip());
+        }
+        if let Some(Some((index, found))) = returned {
+            followed.found = found;
+            followed.is_thin = false;
+            let segment = self.segments.remove(index);
+            self.leave_present();
+            self.segments.push(segment);
+            self.candidate = None;
+            return followed;
+        }
+        self.searched += usize::from(returned.is_some());
+        if steps.is_empty() || is_unfit {
+            let needed = match steps.is_empty() {
+                true => self.settings.segments.scans_lost,
+                false => self.settings.segments.scans_unfit,
+            };
+            self.try_another_map(&measured, needed, &mut followed);
+        } else {
+            self.candidate = None;
+        }
+        if let (None, Some(step)) = (&self.candidate, steps.last()) {
+            self.remember(number, measured, step);
+        }
+        followed
+    }
+
+    /// The present map becomes one of the past, in which only a search finds the sensor again.
+    fn leave_present(&mut self) {
+        if let Some(present) = self.segments.last_mut() {
+            present.tracker.leave();
+            present.tracked = 0;
+        }
+        if self.segments.len() > self.settings.segments.max_kept {
+            self.segments.remove(0);
+        }
+    }
+
+    fn remember(&mut self, scan: usize, measured: MeasuredScan, step: &Step) {
+        let Some(segment) = self.segments.last().filter(|segment| segment.first + step.number == scan) else {
+            return;
+        };
+        let (pose, covariance) = segment.in_world(step);
+        let mut motion = segment.tracker.motion();
+        motion.translation *= segment.scale.voxel;
+        self.anchor = Some(Anchor { scan, measured, T_world_sensor: pose, covariance, motion: motion.log() });
+    }
+
+    /// Follows the scan through a map that was begun when the present one failed.
+    fn try_another_map(&mut self, measured: &MeasuredScan, needed: usize, followed: &mut Followed) {
+        let number = self.count - 1;
+        if let Some(candidate) = &mut self.candidate {
+            let scan = candidate.segment.thinned(measured, &self.settings);
+            let steps = candidate.segment.follow(scan.as_ref());
+            if steps.is_empty() {
+                self.candidate = None;
+            } else {
+                candidate.steps.extend(steps);
+            }
+        }
+        if self.candidate.is_none() {
+            let mut segment = Segment::new(self.worlds, number, &measured.points, &self.settings);
+            let ratio = self.voxel().map_or(f64::INFINITY, |voxel| (segment.scale.voxel / voxel).ln().abs());
+            if needed == self.settings.segments.scans_unfit && ratio < self.settings.segments.least_ratio.ln()
+            {
+                return;
+            }
+            let scan = segment.thinned(measured, &self.settings);
+            let steps = segment.follow(scan.as_ref());
+            if steps.is_empty() {
+                return;
+            }
+            self.candidate = Some(Candidate { segment, steps });
+        }
+        if self.candidate.as_ref().is_some_and(|candidate| candidate.segment.tracked >= needed) {
+            self.go_on_in_another_map(followed);
+        }
+    }
+
+    /// Puts the map on trial in the present one's place, in the same world where the scan before lies in it.
+    fn go_on_in_another_map(&mut self, followed: &mut Followed) {
+        let Some(Candidate { mut segment, steps }) = self.candidate.take() else { return };
+        if let (Some(anchor), Some(present)) = (&self.anchor, self.segments.last())
+            && let Some((transform, covariance)) = self.joined(anchor, &segment)
+        {
+            (segment.number, segment.origin) = (present.number, present.origin);
+            segment.T_world_map = anchor.T_world_sensor * transform.inverse();
+            segment.covariance = covariance;
+        } else {
+            self.worlds += 1;
+        }
+        followed.found = steps.iter().map(|step| segment.found(step)).collect();
+        followed.is_thin = false;
+        self.leave_present();
+        self.segments.push(segment);
+    }
+
+    /// The pose of the scan before in another map, in the scans' unit, and what the map's pose in the world is off by.
+    fn joined(&self, anchor: &Anchor, segment: &Segment) -> Option<(RigidTransform, Covariance)> {
+        let within = MotionWithin {
+            twist: Vector6::from_fn(|k, _| anchor.motion[k] / if k < 3 { 1.0 } else { segment.scale.voxel }),
+            ..segment.tracker.expected_within()
+        };
+        let scan = segment.thinned_with(&anchor.measured, within, &self.settings)?;
+        let steps = segment.first.abs_diff(anchor.scan) as f64;
+        let mut expected = RigidTransform::exp(anchor.motion.map(|component| -steps * component));
+        expected.translation /= segment.scale.voxel;
+        let found = segment.tracker.located(&scan, &[expected, RigidTransform::identity()])?;
+        let mut transform = found.T_map_scan;
+        transform.translation *= segment.scale.voxel;
+        let of_pose =
+            Covariance { random: found.covariance, systematic: found.systematic, ..Covariance::zeros() };
+        let both = anchor.covariance.and(&of_pose.scaled(segment.scale.voxel));
+        Some((transform, both.carried(&transform)))
+    }
+}
+
+/// Searches a scan in one of the past maps, in which it then goes on: its index, and the poses that are found.
+fn search_past(
+    past: &mut [Segment],
+    measured: &MeasuredScan,
+    searched: usize,
+    settings: &OdometrySettings,
+) -> Option<(usize, Vec<FoundPose>)> {
+    // A trial goes on with the next scan; otherwise it is another map's turn.
+    let on_trial = past.iter().position(|segment| segment.tracker.is_on_trial());
+    let chosen = on_trial.or((!past.is_empty()).then(|| searched % past.len()))?;
+    let others = past.iter_mut().enumerate().filter(|(index, _)| *index != chosen);
+    others.for_each(|(_, segment)| segment.tracker.skip());
+    let segment = &mut past[chosen];
+    let scan = segment.thinned(measured, settings);
+    let steps = segment.follow(scan.as_ref());
+    (!steps.is_empty()).then(|| (chosen, steps.iter().map(|step| segment.found(step)).collect()))
+}

@@ -1,0 +1,111 @@
+//! What is done with a sensor that is lost.
+
+/// When another map is begun: where a sensor stays lost, or the lengths that were taken from the first scan do not fit
+/// those that follow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SegmentSettings {
+    /// Scans that follow each other through a map of their own, while they are lost in the present one, after which it
+    /// takes the present one's place: so many may be lost by something that is over soon.
+    pub scans_lost: usize,
+    /// The same, where the present lengths do not fit.
+    pub scans_unfit: usize,
+    /// Share of the voxels that a scan should fill, below which voxels are too large for it.
+    pub least_filled: f64,
+    /// Voxels that a scan fills, in those that one should, above which they are too small, and take too much time.
+    pub most_filled: f64,
+    /// Factor between the present voxels and those that a scan would have, below which another map is not worth it.
+    pub least_ratio: f64,
+    /// Past maps that are kept, to find the sensor again.
+    pub max_kept: usize,
+}
+
+impl Default for SegmentSettings {
+    fn default() -> Self {
+        Self {
+            scans_lost: 5,
+            scans_unfit: 3,
+            least_filled: 0.25,
+            most_filled: 2.0,
+            least_ratio: 1.5,
+            max_kept: 8,
+        }
+    }
+}
+
+/// How a sensor that was lost is found again: among keyframes, by the signatures of their keypoints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RelocalisationSettings {
+    /// Distance between keyframes, in median ranges.
+    pub keyframe_distance: f64,
+    /// Rotation between keyframes nearer than that, in radians.
+    pub keyframe_rotation: f64,
+    /// Keyframes that are searched for one scan, at most: the nearest to where the sensor was last, and as many others
+    /// in turn, so that a search costs a few tracked scans.
+    pub max_keyframes: usize,
+    /// Keyframes that are kept, at most: each takes some 300 kB.
+    pub max_kept: usize,
+    /// Scans after which a keyframe that is not in the map any more may be one that the sensor comes back to.
+    pub scans_apart: u32,
+    /// Distance, in median ranges, within which such a keyframe is looked for.
+    pub loop_distance: f64,
+    /// Scans after a search before a pose is searched again that would be kept without.
+    pub scans_between: usize,
+    /// Step between the rotations about the sensor's axes that are tried at its last position, in radians: a point at
+    /// the median range of some 30 voxels moves by two in half a step.
+    pub rotation_step: f64,
+    /// Points of the scan by which such rotations are compared.
+    pub rotation_points: usize,
+    /// Distance to the map, in voxels, within which such a point counts.
+    pub rotation_distance: f64,
+    /// Share of these points by which more come near the map from another start than from where the motion leads, to be
+    /// preferred.
+    pub clear_gain: f64,
+    /// Such rotations from which the scan is aligned, at most, the best first.
+    pub rotation_trials: usize,
+    /// Matches that agree with a pose that is tried, at least.
+    pub min_matches: usize,
+    /// Poses that are tried on the keyframes' map, at most, those first that most matches agree with.
+    pub max_trials: usize,
+    /// Edge of the voxels of which keypoints are described, in voxels of the map: signatures need more points than a
+    /// pose does.
+    pub detail_voxel: f64,
+    /// Keyframes next to a pose that say what they would have seen.
+    pub observers: usize,
+    /// Largest distance of corresponding points in the first round, in voxels: so far off may a pose be that matches
+    /// propose.
+    pub max_correspondence_distance: f64,
+    /// Overlap by which a pose that was searched must exceed a doubted one, to take its place.
+    pub overlap_gain: f64,
+    /// Scans that must follow each other through a part of the map that was searched, where none alone is certain:
+    /// parts that look alike from one viewpoint differ a little farther on.
+    pub scans_on_trial: usize,
+    /// The same, where the sensor is seen again at its last pose.
+    pub scans_on_trial_there: usize,
+}
+
+impl Default for RelocalisationSettings {
+    fn default() -> Self {
+        Self {
+            keyframe_distance: 0.3,
+            keyframe_rotation: 30.0_f64.to_radians(),
+            max_keyframes: 16,
+            max_kept: 400,
+            scans_apart: 30,
+            loop_distance: 0.6,
+            scans_between: 10,
+            rotation_step: 8.0_f64.to_radians(),
+            rotation_points: 300,
+            rotation_distance: 1.5,
+            clear_gain: 0.1,
+            rotation_trials: 2,
+            min_matches: 24,
+            max_trials: 3,
+            detail_voxel: 0.5,
+            observers: 4,
+            max_correspondence_distance: 4.0,
+            overlap_gain: 0.1,
+            scans_on_trial: 3,
+            scans_on_trial_there: 2,
+        }
+    }
+}

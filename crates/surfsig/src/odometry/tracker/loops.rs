@@ -1,0 +1,56 @@
+//! A sensor that comes back to where it was: the map that was dropped there is loaded again, and what the way around has
+//! drifted by is known.
+
+use super::super::keyframes::Which;
+use super::super::scan_alignment::{ScanAlignment, align};
+use super::super::thinned_scan::ThinnedScan;
+use super::Tracker;
+use crate::RigidTransform;
+use std::collections::BTreeSet;
+
+/// A scan that lies on what an earlier one saw; lengths are in voxels, and scans are numbered from 0.
+#[allow(non_snake_case)]
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Loop {
+    pub scan: usize,
+    /// The scan of the keyframe next to it.
+    pub earlier: usize,
+    pub T_earlier_scan: RigidTransform,
+    /// The scan's pose by the way around.
+    pub T_map_scan_before: RigidTransform,
+}
+
+impl Tracker {
+    /// Where a scan at a new keyframe's pose lies on keyframes that the map lacks: loads these, moves what the map has
+    /// onto them, and gives the scan's pose there.
+    pub(super) fn closed_loop(&mut self, scan: &ThinnedScan, found: &ScanAlignment) -> Option<ScanAlignment> {
+        let numbers: BTreeSet<u32> = self.map.scans().iter().copied().collect();
+        self.keyframes.mark_loaded(&numbers, self.number as u32);
+        let (map, earlier) = self.keyframes.unloaded_near(&found.T_map_scan, self.map_range)?;
+        let distance = self.settings.relocalisation.max_correspondence_distance;
+        let known = |pose: &RigidTransform| self.keyframes.would_have_seen(pose, Which::Unloaded);
+        let there = align(scan, &map, found.T_map_scan, distance, &self.settings.alignment, known)?;
+        if !(there.free_directions.is_empty() && self.is_met(&there)) {
+            return None;
+        }
+        let correction = there.T_map_scan * found.T_map_scan.inverse();
+        let present = std::mem::replace(&mut self.map, map);
+        self.map.add_moved(&present, &correction);
+        self.keyframes.move_loaded(&correction);
+        for number in numbers {
+            if let Some(Some((pose, _))) = self.mapped.get_mut(number as usize) {
+                *pose = correction * *pose;
+            }
+        }
+        self.last = correction * self.last;
+        self.last_mapped = self.last_mapped.map(|pose| correction * pose);
+        let of_earlier = self.keyframes.pose(earlier)?;
+        self.loops.push(Loop {
+            scan: self.number,
+            earlier: earlier as usize,
+            T_earlier_scan: of_earlier.inverse() * there.T_map_scan,
+            T_map_scan_before: found.T_map_scan,
+        });
+        Some(there)
+    }
+}

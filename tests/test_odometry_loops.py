@@ -1,0 +1,113 @@
+"""A way that comes back: its drift is distributed, and what all scans saw is fused."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import surfsig
+from surfsig import PointCloud, geometry, simulate
+from surfsig.odometry import LoopClosure
+from surfsig.odometry.fused_map import FusedMap, fused_map
+from surfsig.odometry.loop_closing import closed
+
+Array = NDArray[np.float64]
+
+
+def ring(count: int, radius: float) -> Array:
+    """Poses along a circle and back to its start."""
+    return np.array(
+        [
+            simulate.upright_pose(radius * np.cos(a), radius * np.sin(a), 1.0, a + 0.5 * np.pi)
+            for a in np.linspace(0.0, 2.0 * np.pi, count)
+        ]
+    )
+
+
+def drifted(true: Array, twist: Array) -> Array:
+    """The same way with an error in each step."""
+    poses = [true[0]]
+    for before, after in itertools.pairwise(true):
+        poses.append(poses[-1] @ geometry.inverse(before) @ after @ geometry.exp_twist(twist))
+    return np.array(poses)
+
+
+def test_a_loop_takes_the_drift_of_its_way() -> None:
+    true = ring(80, 12.0)
+    wrong = drifted(true, np.array([0.0, 0.0, 1e-3, 3e-3, 0.0, 1e-3]))
+    loop = LoopClosure(79, 0, geometry.inverse(true[0]) @ true[79], wrong[79])
+    # Where a loop is closed, the scan's pose is that by the earlier one.
+    given = wrong.copy()
+    given[79] = true[79]
+    found = closed(given, np.zeros(80, np.int64), [loop], 8.0)
+    before = np.linalg.norm(wrong[:, :3, 3] - true[:, :3, 3], axis=1)
+    after = np.linalg.norm(found[:, :3, 3] - true[:, :3, 3], axis=1)
+    assert after[-1] < 0.05 * before[-1]
+    assert after.max() < 0.35 * before.max()
+    np.testing.assert_allclose(found[0], true[0], atol=1e-12)
+    for pose in found:
+        np.testing.assert_allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-9)
+    # The world's axes do not matter.
+    frame = simulate.upright_pose(300.0, -20.0, 5.0, 1.1, (0.2, 0.1))
+    moved = LoopClosure(79, 0, loop.T_earlier_scan, frame @ wrong[79])
+    np.testing.assert_allclose(
+        closed(frame @ given, np.zeros(80, np.int64), [moved], 8.0), frame @ found, atol=1e-6
+    )
+
+
+def test_segments_without_a_loop_and_scans_without_a_pose_stay() -> None:
+    true = ring(40, 5.0)
+    given = drifted(true, np.array([0.0, 0.0, 2e-3, 0.0, 0.0, 0.0]))
+    given[5] = np.nan
+    segments = np.repeat([0, 1], [20, 20])
+    segments[5] = -1
+    loop = LoopClosure(19, 0, geometry.inverse(given[0]) @ true[19], given[19])
+    found = closed(given, segments, [loop], 5.0)
+    np.testing.assert_array_equal(found[20:], given[20:])
+    assert np.isnan(found[5]).all()
+    assert np.abs(found[19] - given[19]).max() > 1e-3
+    np.testing.assert_array_equal(closed(given, segments, [], 5.0), given)
+
+
+def test_a_fused_map_has_a_point_for_each_voxel() -> None:
+    rng = np.random.default_rng(5)
+    points = np.column_stack([rng.uniform(0.0, 4.0, (6000, 2)), rng.normal(0.0, 0.005, 6000)])
+    poses = np.array([simulate.upright_pose(1.0, 2.0, 1.0, 0.3), simulate.upright_pose(3.0, 1.0, 2.0, -1.0)])
+    half = [points, points[points[:, 0] > 2.0]]
+    scans = [
+        PointCloud(geometry.transform_points(geometry.inverse(pose), some))
+        for pose, some in zip(poses, half, strict=True)
+    ]
+    lost = np.full((1, 4, 4), np.nan)
+    found = fused_map([*scans, scans[0]], np.concatenate([poses, lost]), 0.2)
+    key = np.floor(np.concatenate(half) / 0.2).astype(int)
+    assert len(found) == len(np.unique(key, axis=0))
+    assert len(np.unique(np.floor(found.points / 0.2 + 1e-4), axis=0)) > 0.98 * len(found)
+    normals = np.column_stack([found.fields[name] for name in ("nx", "ny", "nz")])
+    known = np.isfinite(normals).all(axis=1)
+    assert known.mean() > 0.99
+    assert (normals[known, 2] > 0.99).all(), "towards the sensors, which are above"
+    # Beside the edge of the half, voxels are seen once or twice as their points are.
+    twice = found.fields["scans"] == 2
+    assert set(found.fields["scans"].tolist()) == {1, 2}
+    assert (found.points[twice, 0] > 1.95).all()
+    assert len(FusedMap(0.1).cloud()) == 0
+
+
+@pytest.mark.slow
+def test_a_map_is_fused_from_what_was_followed() -> None:
+    room = simulate.room(6)
+    poses = [simulate.upright_pose(0.15 * k - 0.4, 0.0, 1.2, 0.1 * k) for k in range(5)]
+    scans = [
+        simulate.scan(room, simulate.Lidar(lines=24, steps=300), pose, seed=k) for k, pose in enumerate(poses)
+    ]
+    found = surfsig.estimate_odometry(scans)
+    cloud = found.map(scans)
+    at = geometry.transform_points(poses[0], cloud.points.astype(np.float64))
+    nearest = np.min([np.abs(placed.implicit(at)) for placed in room.objects], axis=0)
+    assert np.quantile(nearest, 0.9) < found.voxel
+    with pytest.raises(surfsig.InvalidInputError, match="voxel must be"):
+        found.map(scans, voxel=0.0)
