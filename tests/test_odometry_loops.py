@@ -9,9 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 import surfsig
-from surfsig import PointCloud, geometry, simulate
+from surfsig import geometry, simulate
 from surfsig.odometry import LoopClosure
-from surfsig.odometry.fused_map import FusedMap, fused_map
 from surfsig.odometry.loop_closing import closed
 
 Array = NDArray[np.float64]
@@ -72,31 +71,6 @@ def test_segments_without_a_loop_and_scans_without_a_pose_stay() -> None:
     np.testing.assert_array_equal(closed(given, segments, [], 5.0), given)
 
 
-def test_a_fused_map_has_a_point_for_each_voxel() -> None:
-    rng = np.random.default_rng(5)
-    points = np.column_stack([rng.uniform(0.0, 4.0, (6000, 2)), rng.normal(0.0, 0.005, 6000)])
-    poses = np.array([simulate.upright_pose(1.0, 2.0, 1.0, 0.3), simulate.upright_pose(3.0, 1.0, 2.0, -1.0)])
-    half = [points, points[points[:, 0] > 2.0]]
-    scans = [
-        PointCloud(geometry.transform_points(geometry.inverse(pose), some))
-        for pose, some in zip(poses, half, strict=True)
-    ]
-    lost = np.full((1, 4, 4), np.nan)
-    found = fused_map([*scans, scans[0]], np.concatenate([poses, lost]), 0.2)
-    key = np.floor(np.concatenate(half) / 0.2).astype(int)
-    assert len(found) == len(np.unique(key, axis=0))
-    assert len(np.unique(np.floor(found.points / 0.2 + 1e-4), axis=0)) > 0.98 * len(found)
-    normals = np.column_stack([found.fields[name] for name in ("nx", "ny", "nz")])
-    known = np.isfinite(normals).all(axis=1)
-    assert known.mean() > 0.99
-    assert (normals[known, 2] > 0.99).all(), "towards the sensors, which are above"
-    # Beside the edge of the half, voxels are seen once or twice as their points are.
-    twice = found.fields["scans"] == 2
-    assert set(found.fields["scans"].tolist()) == {1, 2}
-    assert (found.points[twice, 0] > 1.95).all()
-    assert len(FusedMap(0.1).cloud()) == 0
-
-
 @pytest.mark.slow
 def test_a_map_is_fused_from_what_was_followed() -> None:
     room = simulate.room(6)
@@ -111,3 +85,5 @@ def test_a_map_is_fused_from_what_was_followed() -> None:
     assert np.quantile(nearest, 0.9) < found.voxel
     with pytest.raises(surfsig.InvalidInputError, match="voxel must be"):
         found.map(scans, voxel=0.0)
+    with pytest.raises(surfsig.InvalidInputError, match="there are 5 poses, but 4 scans"):
+        found.map(scans[:4])

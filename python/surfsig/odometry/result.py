@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.arguments import positive_length
-from surfsig.odometry.fused_map import fused_map
+from surfsig.fusion import fuse_scans
 from surfsig.odometry.loop_closing import LoopClosure
 from surfsig.odometry.point_times import deskew
 from surfsig.odometry.report import report_html
@@ -153,14 +153,16 @@ class Odometry:
         Raises
         ------
         InvalidInputError
-            If the voxel is no length, or no scan has a pose.
+            If the voxel is no length, or there is not one scan for each pose.
         """
         edge = positive_length(self.voxel if voxel is None else voxel, "voxel")
         straight = (
-            deskew(cloud, twist, timestamp=timestamp, spin_rate=spin_rate)
-            for cloud, twist, timestamp in zip(scans, self.twists, self.timestamps.tolist(), strict=False)
+            deskew(cloud, self.twists[k], timestamp=float(self.timestamps[k]), spin_rate=spin_rate)
+            if k < len(self)
+            else cloud
+            for k, cloud in enumerate(scans)
         )
-        return fused_map(straight, self.poses_of(self.longest_segment), edge)
+        return fuse_scans(straight, self.poses_of(self.longest_segment), voxel=edge)
 
     @property
     def length(self) -> float:

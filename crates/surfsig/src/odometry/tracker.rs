@@ -180,9 +180,15 @@ impl Tracker {
             return self.take(scan, &scan.points, first);
         }
         self.since_search = self.since_search.saturating_add(1);
-        let prediction = self.expected(scan);
+        let mut prediction = self.prediction();
         let first = self.aligned(scan, prediction);
-        let first = first.and_then(|found| self.deskew_first(scan, found));
+        let mut first = first.and_then(|found| self.deskew_first(scan, found));
+        if !first.as_ref().is_some_and(|found| self.is_met(found))
+            && let Some((start, found)) = self.by_other_motion(scan, first.as_ref())
+        {
+            prediction = start;
+            first = Some(found);
+        }
         let chosen = match first {
             Some(found) if self.is_met(&found) => Some((found, ScanStatus::Tracked)),
             doubted => self.found_elsewhere_or_doubted(scan, doubted, &prediction),

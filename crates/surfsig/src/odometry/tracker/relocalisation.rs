@@ -34,23 +34,34 @@ impl Tracker {
         doubted.filter(|found| self.is_expected(found, prediction)).map(|found| (found, ScanStatus::Tracked))
     }
 
-    /// Where the scan is aligned from: where its motion leads; or where it was, or from there back by its last motion,
-    /// as one that is shaken comes back, if it clearly lies better on the map there.
-    pub(super) fn expected(&self, scan: &ThinnedScan) -> RigidTransform {
+    /// The pose of a sensor that has stopped, or goes back as one that is shaken does, and where it was aligned from,
+    /// if the scan clearly lies better there than where its motion leads.
+    pub(super) fn by_other_motion(
+        &self,
+        scan: &ThinnedScan,
+        doubted: Option<&ScanAlignment>,
+    ) -> Option<(RigidTransform, ScanAlignment)> {
+        // Along a free direction lines of the scan lie best on those of the scan before, and would stop the sensor.
+        if doubted.is_some_and(|doubted| !doubted.free_directions.is_empty()) {
+            return None;
+        }
         let settings = &self.settings.relocalisation;
         let prediction = self.prediction();
         let points = some_points(scan.coarse.points(), settings.rotation_points);
         let near =
             |pose: &RigidTransform| points_near(&points, &self.map, pose, settings.rotation_distance) as f64;
-        let mut best = (prediction, near(&prediction) + settings.clear_gain * points.len() as f64);
-        let least = self.settings.prediction.min_correspondence_distance;
-        for start in [self.last, self.last * self.motion.inverse()] {
-            if self.distance_at_range(&(prediction.inverse() * start)) > least {
-                let count = near(&start);
-                best = if count > best.1 { (start, count) } else { best };
-            }
-        }
-        best.0
+        let least = near(&prediction) + settings.clear_gain * points.len() as f64;
+        let distance = self.settings.prediction.min_correspondence_distance;
+        let (start, _) = [self.last, self.last * self.motion.inverse()]
+            .into_iter()
+            .filter(|start| self.distance_at_range(&(prediction.inverse() * *start)) > distance)
+            .map(|start| (start, near(&start)))
+            .filter(|(_, count)| *count > least)
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let found = self.aligned(scan, start)?;
+        let is_chosen =
+            found.free_directions.is_empty() && self.is_met(&found) && self.is_better(&found, doubted);
+        is_chosen.then_some((start, found))
     }
 
     /// From where the sensor is expected, rotated about itself.
