@@ -29,9 +29,9 @@ Array = NDArray[np.float64]
 
 LEAST = 0.01
 """Probability, by the coefficients that are replaced, of what is learnt from."""
-RIDGE = 0.002
+RIDGE = 0.0005
 """Weight of the squared coefficients of standardised terms, so that few examples do not drive them away."""
-SIGNS = (0, 1, 1, -1, -1, 1, -1, 1, 1, 1, 0)
+SIGNS = (0, 1, 1, -1, -1, 1, -1, 1)
 """Of the coefficients, as few examples tell them badly: 1 of what speaks for a pose, -1 of what speaks
 against it, 0 of both."""
 NOT_SHOWN = 3
@@ -53,10 +53,7 @@ def terms(measures: dict[str, float]) -> list[float]:
         of(measures["missing"]),
         measures["agreement"],
         measures["going_on"],
-        max(measures["agreement"] - 0.85, 0.0),
         min(measures["roundness"] / 0.1, 1.0),
-        np.log(max(measures["roundness"], 1e-3)),
-        np.log(max(measures["resolution"], 1.0)),
     ]
 
 

@@ -68,7 +68,7 @@ def test_what_cannot_be_looked_for_is_said() -> None:
 
 
 def test_what_is_inside_an_object_is_left_out() -> None:
-    outer, inner = ball(0.05).points, ball(0.03).points
+    outer, inner = ball(0.05).points, ball(0.02).points
     normals = outer / np.linalg.norm(outer, axis=1, keepdims=True)
     inside = inner / np.linalg.norm(inner, axis=1, keepdims=True)
     # Every other outer normal points inwards.
@@ -78,10 +78,10 @@ def test_what_is_inside_an_object_is_left_out() -> None:
     )
     seen = outer_surface(surfsig.PointCloud(np.concatenate([outer, inner]), fields=fields))
     radius = np.linalg.norm(seen.points, axis=1)
-    assert (radius > 0.04).sum() == len(outer)
-    assert (radius < 0.04).mean() < 0.01
+    assert (radius > 0.03).sum() == len(outer)
+    assert (radius < 0.03).mean() < 0.01
     found = np.stack([seen.fields[name] for name in ("nx", "ny", "nz")], axis=1)
-    assert (np.einsum("ij,ij->i", found, seen.points)[radius > 0.04] > 0.0).all()
+    assert (np.einsum("ij,ij->i", found, seen.points)[radius > 0.03] > 0.0).all()
 
 
 def write_box(path: Path) -> None:

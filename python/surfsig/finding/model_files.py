@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from surfsig import _surfsig
 from surfsig.errors import InvalidInputError
 from surfsig.files import read
 from surfsig.point_cloud import PointCloud
-from surfsig.spacing import point_spacing
 
 MODEL_SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".pcd", ".xyz", ".npz")
 """Names of files of a folder that are models."""
@@ -21,6 +21,13 @@ SURFACE_SAMPLES = 20_000
 """Points spread over a mesh: 2 mm apart on an object of 150 mm."""
 _VIEWS = 120
 """Directions from which it is tried whether a point can be seen: 20 degrees apart."""
+_LEAST_VIEWS = 5
+"""Of these, how many see a point of the outer surface at least: chance gaps between points let one or two see
+what is inside."""
+_NEIGHBOURS = 8
+"""Neighbours within a spacing, so that points by chance leave hardly a gap."""
+_WIDEST = 0.9
+"""Quantile of the points' spacings that counts: inner parts may be denser."""
 _ONE_SIDE = 0.5
 """Share by which more is seen of one side of a point than of the other, so that it is the outer one."""
 _NORMALS = ("nx", "ny", "nz")
@@ -62,16 +69,19 @@ def read_model(path: Path, **reading: Any) -> PointCloud:
 def outer_surface(cloud: PointCloud) -> PointCloud:
     """Leave out the points of a whole object that no sensor sees from anywhere, as of parts inside.
 
-    A point counts as seen where nothing is before it from one of many directions that are spread over the
+    A point counts as seen where nothing is before it from a few of many directions that are spread over the
     sphere. Its normal, if it has one, is turned to the side from which it is seen; where that is both, it
     stays.
     """
     finite = cloud.at(np.flatnonzero(cloud.finite))
-    points = np.ascontiguousarray(finite.points - finite.points.mean(axis=0), np.float64)
-    spacing = point_spacing(points)
-    if len(points) == 0 or spacing == 0.0:
+    if len(finite) == 0:
         return finite
-    seen = np.zeros(len(points), np.bool_)
+    points = np.ascontiguousarray(finite.points - finite.points.mean(axis=0), np.float64)
+    distances = cKDTree(points).query(points, k=[_NEIGHBOURS + 1])[0] if len(points) > _NEIGHBOURS else [0.0]
+    spacing = float(np.quantile(distances, _WIDEST))
+    if spacing == 0.0:
+        return finite
+    views = np.zeros(len(points), np.int64)
     towards, total = np.zeros(len(points)), np.zeros(len(points))
     has_normals = all(name in finite.fields for name in _NORMALS)
     normals = np.stack([finite.fields[name] for name in _NORMALS], axis=1) if has_normals else None
@@ -80,11 +90,12 @@ def outer_surface(cloud: PointCloud) -> PointCloud:
         u /= np.linalg.norm(u)
         across = [u.tolist(), np.cross(direction, u).tolist()]
         visible = ~_surfsig.hidden_from(direction.tolist(), across, points, points, spacing)
-        seen |= visible
+        views += visible
         if normals is not None:
             cosine = np.where(visible, normals @ direction, 0.0)
             towards += cosine
             total += np.abs(cosine)
+    seen = views >= _LEAST_VIEWS
     kept = finite.at(np.flatnonzero(seen))
     if normals is not None:
         side = np.where(towards < -_ONE_SIDE * total, -1.0, 1.0)[seen]
