@@ -42,6 +42,15 @@ impl GicpCloud {
         Self { points, normals, tree }
     }
 
+    /// Those of the points that are wanted, with the normals that they have among all.
+    pub(crate) fn some(&self, is_wanted: impl Fn([f64; 3]) -> bool + Sync) -> Self {
+        let all = self.points.par_iter().zip(&self.normals).with_min_len(PART);
+        let (points, normals): (Vec<[f64; 3]>, Vec<[f64; 3]>) =
+            all.filter(|(point, _)| is_wanted(**point)).map(|(point, normal)| (*point, *normal)).unzip();
+        let tree = KdTree::new(&points);
+        Self { points, normals, tree }
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.points.len()

@@ -97,28 +97,39 @@ impl Trial<'_> {
         Ok(Some(Tried { found: better, judged, support: own }))
     }
 
-    /// Fits the points of the sample to the surface, but for those that see the other side of it: scans from two rooms
-    /// see both sides of a wall, which would pull each other together.
+    /// Whether the nearest of the target's points shows the other side of the surface: scans from two rooms see both
+    /// sides of a wall, which would pull each other together.
+    fn sees_other_side(&self, point: [f64; 3], transform: &RigidTransform, near: f64) -> bool {
+        let cosine = || {
+            let [source, target] = self.sides.as_ref()?;
+            let own = source.normal_near(point, near)?;
+            let other = target.normal_near(transform.transform_point(point), near)?;
+            Some(Vector3::from(transform.transform_vector(own.into())).dot(&other))
+        };
+        cosine().is_some_and(|cosine| cosine < -SAME_SIDE)
+    }
+
+    /// Fits the points of the sample to the surface, but for those that see the other side of it.
     fn aligned(&self, start: RigidTransform) -> Option<PointToSurface> {
         let Judge { surface, sample, settings, .. } = self.judge;
         let near = settings.point_to_surface.max_distance * self.voxel;
-        let sees_other_side = |point: &[f64; 3]| {
-            let [source, target] = self.sides.as_ref()?;
-            let own = source.normal_near(*point, near)?;
-            let other = target.normal_near(start.transform_point(*point), near)?;
-            Some(Vector3::from(start.transform_vector(own.into())).dot(&other) < -SAME_SIDE)
-        };
         let kept: Vec<[f64; 3]> =
-            sample.iter().filter(|point| !sees_other_side(point).unwrap_or(false)).copied().collect();
+            sample.iter().filter(|point| !self.sees_other_side(**point, &start, near)).copied().collect();
         let mut found = surface.align(&kept, start, &settings.point_to_surface)?;
         found.overlap *= kept.len() as f64 / sample.len() as f64;
         Some(found)
     }
 
-    /// By generalised ICP, in voxels; a transform without correspondences stays as it was proposed.
+    /// By generalised ICP, in voxels, without points that see the other side of the surface; a transform without
+    /// correspondences stays as it was proposed.
     fn refined(&self, proposed: RigidTransform) -> RigidTransform {
         let settings = self.judge.settings;
         let [source, target] = self.clouds;
+        let near = settings.gicp_distances[0] * self.voxel;
+        // Where sides are not known, all points stay.
+        let kept =
+            self.sides.as_ref().map(|_| source.some(|point| !self.sees_other_side(point, &proposed, near)));
+        let source = kept.as_ref().unwrap_or(source);
         let mut transform = proposed;
         for distance in settings.gicp_distances {
             let [rotation_epsilon, translation] = settings.gicp_epsilon;
