@@ -2,7 +2,7 @@
 
 python benchmarks/loops.py --write
 
-Corridors with niches around a block of rooms, 400 m of them, once around and then the first metres again. The
+Corridors with cupboards around a block of rooms, 400 m of them, once around and then the first metres again. The
 sensor sees 15 m, so that the beginning is out of its map when it comes back.
 """
 
@@ -50,7 +50,7 @@ def main() -> None:
 
 
 def block(seed: int, side: float) -> simulate.Scene:
-    """Build a corridor 3 m wide around a block, with door frames, niches and cupboards along its walls."""
+    """Build a corridor 3 m wide around a block, with cupboards and shelves along its walls."""
     rng = np.random.default_rng([91, seed])
     outer = side + 1.5
     placed = [box((side / 2, side / 2, -0.05), (side + 6, side + 6, 0.1))]
@@ -64,10 +64,10 @@ def block(seed: int, side: float) -> simulate.Scene:
     ):
         placed.append(box((x, y, 1.4), (a, b, 2.8)))
     for wall in range(4):
-        for at in np.arange(3.0, side - 3.0, 2.5):
-            along = at + rng.uniform(-0.8, 0.8)
+        for at in np.arange(3.0, side - 3.0, 1.3):
+            along = at + rng.uniform(-0.5, 0.5)
             side_of = rng.choice((-1.0, 1.0))
-            wide, depth, high = rng.uniform((0.3, 0.1, 0.8), (1.2, 0.4, 2.6))
+            wide, depth, high = rng.uniform((0.3, 0.2, 0.8), (0.9, 0.8, 2.6))
             across = side_of * (1.5 - 0.5 * depth)
             middle, size = (along, across, 0.5 * high), (wide, depth, high)
             if wall % 2:
@@ -101,7 +101,10 @@ def around(side: float, step: float) -> Array:
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     keep = np.concatenate([[True], np.diff(length) > 1e-9])
     curve = CubicSpline(length[keep], points[keep])
-    at = np.arange(0.0, length[-1], step)
+    # From rest, as a sensor does: a corridor hardly says how far it went, so the last motion matters.
+    speeds = step * np.minimum(1.0, 0.1 * np.arange(1, int(length[-1] / step) + 10))
+    at = np.concatenate([[0.0], np.cumsum(speeds)])
+    at = at[at <= length[-1]]
     x, y = curve(at).T
     ahead = curve(at, 1)
     yaw = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))

@@ -1074,6 +1074,37 @@ surfsig_code surfsig_odometry_push(surfsig_odometry *odometry,
                                    surfsig_scan_pose *pose);
 
 /**
+ * Takes the next scan of a sensor that moves while it scans: points are taken to where they would have been measured at
+ * the time of the pose, by a constant twist that is refined with the pose.
+ *
+ * @param odometry The sequence.
+ * @param scan The scan; its directions are not looked at.
+ * @param times Of each point, from the time of the pose on, in intervals from this scan to the next one: -0.5 to 0.5 for
+ * a sensor that scans all along, and a pose at the middle. What is not finite counts as 0.
+ * @param pose Where the scan's result is put; null where nobody wants it.
+ */
+surfsig_code surfsig_odometry_push_timed(surfsig_odometry *odometry,
+                                         const surfsig_scan *scan,
+                                         const double *times,
+                                         surfsig_scan_pose *pose);
+
+/**
+ * Number of the map that a scan's pose is in, from 0: where a sensor stays lost, another map is begun, whose frame is
+ * that of its first scan. -1 for a scan without a pose, one that there is not, and null.
+ */
+int64_t surfsig_odometry_segment(const surfsig_odometry *odometry, size_t index);
+
+/**
+ * Gives the twist (rotation vector in radians, then translation) in a scan's own axes by which the sensor moves from
+ * that scan to the next one, if its motion goes on: NaN where no times of points were given, and where there is no pose.
+ *
+ * @param odometry The sequence.
+ * @param index Number of a scan, from 0.
+ * @param twist Room for 6 doubles.
+ */
+surfsig_code surfsig_odometry_twist(const surfsig_odometry *odometry, size_t index, double *twist);
+
+/**
  * Number of scans so far; 0 for null.
  */
 size_t surfsig_odometry_size(const surfsig_odometry *odometry);

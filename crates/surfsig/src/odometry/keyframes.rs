@@ -214,8 +214,13 @@ impl Keyframes {
         let consensus = ConsensusSettings::default();
         let ours = described(&in_float32(&scan.means(settings.detail_voxel)), radius);
         let mut proposals: Vec<(usize, RigidTransform)> = Vec::new();
+        let mut newly_described = 0;
         for number in searched {
             let keyframe = &mut self.kept[number];
+            newly_described += usize::from(keyframe.described.is_none());
+            if keyframe.described.is_none() && newly_described > settings.max_described {
+                continue;
+            }
             let theirs = keyframe.described.get_or_insert_with(|| described(&keyframe.detail, radius));
             let matches = Correspondences::new(&match_fields(&ours, theirs, true), &ours, theirs, consensus);
             let transform = matches.agreed_transform();

@@ -42,6 +42,9 @@ pub struct RelocalisationSettings {
     /// Keyframes that are searched for one scan, at most: the nearest to where the sensor was last, and as many others
     /// in turn, so that a search costs a few tracked scans.
     pub max_keyframes: usize,
+    /// Of these, keyframes whose keypoints are described for one scan, at most: that takes longer than all else, and is
+    /// done once for each.
+    pub max_described: usize,
     /// Keyframes that are kept, at most: each takes some 300 kB.
     pub max_kept: usize,
     /// Scans after which a keyframe that is not in the map any more may be one that the sensor comes back to.
@@ -89,6 +92,7 @@ impl Default for RelocalisationSettings {
             keyframe_distance: 0.3,
             keyframe_rotation: 30.0_f64.to_radians(),
             max_keyframes: 16,
+            max_described: 4,
             max_kept: 400,
             scans_apart: 30,
             loop_distance: 0.6,
