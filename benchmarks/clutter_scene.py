@@ -213,7 +213,7 @@ def _clutter(rng: np.random.Generator) -> Parts:
     """Draw an everyday shape: a box, a book, a can, a ball, a bottle, or something of several parts."""
     kind = rng.integers(6)
     if kind == 0:
-        return [(simulate.Box(tuple(rng.uniform(0.04, 0.2, 3))), np.eye(4))]  # type: ignore[arg-type]
+        return [(simulate.Box(tuple(rng.uniform(0.04, 0.2, 3))), np.eye(4))]
     if kind == 1:
         return [(simulate.Box((0.15, 0.21, float(rng.uniform(0.01, 0.04)))), np.eye(4))]
     if kind == 2:

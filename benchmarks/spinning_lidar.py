@@ -89,7 +89,7 @@ def sequence(speed: float, rate: float, seed: int, seconds: float) -> tuple[list
     position, angles = trajectory(speed, rate, seed)
     scene = simulate.Scene(hard_sequences.street(seed))
     count = int(seconds / PERIOD)
-    middles = PERIOD * (np.arange(count) + 0.5)
+    middles = np.asarray(PERIOD * (np.arange(count) + 0.5), np.float64)
     within = PERIOD * (np.arange(LIDAR.steps) / LIDAR.steps - 0.5)
     scans = [
         simulate.scan_moving(
@@ -132,14 +132,14 @@ def by_kiss(
         file = Path(folder) / "scans.npz"
         arrays = {f"scan{number}": scan.points for number, scan in enumerate(scans)}
         arrays |= {f"times{number}": scan.fields["time"] / PERIOD + 0.5 for number, scan in enumerate(scans)}
-        np.savez(file, **arrays)
+        np.savez(file, allow_pickle=True, **arrays)
         try:
             answer = run_json([peer_python(), HERE / "odometry_peers.py", file, "--voxel", "1.0"], threads=1)
         except PeerUnavailable as error:
             return f"not run: {error}", ""
     position, angles = trajectory(speed, rate, seed)
     count = int(seconds / PERIOD)
-    ends = [PERIOD * (np.arange(count) + part) for part in (0.5, 1.0)]
+    ends = [np.asarray(PERIOD * (np.arange(count) + part), np.float64) for part in (0.5, 1.0)]
     off = [
         moving_sensor.errors(np.array(answer["poses"]), poses_at(at, position, angles))[0][-1] for at in ends
     ]

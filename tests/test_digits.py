@@ -88,6 +88,7 @@ def test_found_instances_have_the_digits_of_their_errors() -> None:
         covariance=covariance,
         center=pose[:3, 3],
         score=0.5,
+        measures={},
         visible=0.5,
         overlap=0.5,
         rms=0.001,

@@ -73,7 +73,7 @@ def test_a_page_of_instances_shows_models_in_their_poses(tmp_path: Path) -> None
     scene = surfsig.PointCloud(RNG.uniform(size=(30, 3)))
     numbers = np.arange(10, 20)
     one = Instance(
-        "cup", POSE, np.eye(6), np.zeros(3), 0.5, 0.7, 0.4, 0.001, [], [], 1.0, 0.01, [], [], numbers
+        "cup", POSE, np.eye(6), np.zeros(3), 0.5, {}, 0.7, 0.4, 0.001, [], [], 1.0, 0.01, [], [], numbers
     )
     found = Instances([one], scene, {"cup": model})
     found.write_report(tmp_path / "page.html")

@@ -265,7 +265,7 @@ def _packed(model: Model) -> tuple[bytes, int]:
         "normals": model.normals,
     }
     for number, signatures in enumerate((model.signatures, *model.larger_signatures)):
-        arrays[f"radius_{number}"] = np.float64(signatures.radius)
+        arrays[f"radius_{number}"] = np.array(signatures.radius)
         arrays |= {f"signature_{number}_{name}": getattr(signatures, name) for name in _SIGNATURES}
     file = io.BytesIO()
     np.savez(file, allow_pickle=False, **arrays)
@@ -283,7 +283,7 @@ def _unpacked(radius: float, spacing: float, sided: int, size: int, packed: byte
         points, center, samples, normals = whole
         if "radius_0" not in arrays:
             return model_of(PointCloud(points, origin=center))
-        signatures = []
+        signatures: list[FieldSignatures] = []
         while f"radius_{len(signatures)}" in arrays:
             number = len(signatures)
             known = {name: arrays[f"signature_{number}_{name}"] for name in _SIGNATURES}
