@@ -2,7 +2,7 @@
 
 python benchmarks/loops.py --write
 
-Corridors with cupboards around a block of rooms, 400 m of them, once around and then the first metres again. The
+Corridors with cupboards around a block of rooms, once around and then the first metres again. The
 sensor sees 15 m, so that the beginning is out of its map when it comes back.
 """
 
