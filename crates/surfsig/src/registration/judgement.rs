@@ -151,7 +151,7 @@ impl Judge<'_> {
         let is_freer_than = |share: f64| judged.free_space <= share;
         let explains_much = judged.explained >= settings.certain_explained;
         let is_proved_by_faces = support.faces.is_exclusive
-            && is_freer_than(settings.free_space.doubted_share)
+            && is_freer_than(settings.free_space.certain_share)
             || support.faces.is_searched && explains_much && is_freer_than(settings.faces.certain_free_space);
         let needed = if is_proved_by_faces {
             0
