@@ -849,8 +849,7 @@ void surfsig_find_options_free(surfsig_find_options *options);
  * @param options The options to change.
  * @param score The probability that the instance's pose is right, above 0 and up to 1; 0 for the default.
  */
-surfsig_code surfsig_find_options_set_score(surfsig_find_options *options,
-                                            double score);
+surfsig_code surfsig_find_options_set_score(surfsig_find_options *options, double score);
 
 /**
  * Chooses the number of threads. The result is the same, bit for bit.
@@ -1092,7 +1091,8 @@ surfsig_code surfsig_odometry_push_timed(surfsig_odometry *odometry,
  * Number of the map that a scan's pose is in, from 0: where a sensor stays lost, another map is begun, whose frame is
  * that of its first scan. -1 for a scan without a pose, one that there is not, and null.
  */
-int64_t surfsig_odometry_segment(const surfsig_odometry *odometry, size_t index);
+int64_t surfsig_odometry_segment(const surfsig_odometry *odometry,
+                                 size_t index);
 
 /**
  * Gives the twist (rotation vector in radians, then translation) in a scan's own axes by which the sensor moves from
@@ -1102,7 +1102,9 @@ int64_t surfsig_odometry_segment(const surfsig_odometry *odometry, size_t index)
  * @param index Number of a scan, from 0.
  * @param twist Room for 6 doubles.
  */
-surfsig_code surfsig_odometry_twist(const surfsig_odometry *odometry, size_t index, double *twist);
+surfsig_code surfsig_odometry_twist(const surfsig_odometry *odometry,
+                                    size_t index,
+                                    double *twist);
 
 /**
  * Number of scans so far; 0 for null.

@@ -92,7 +92,7 @@ impl Default for RelocalisationSettings {
             keyframe_distance: 0.3,
             keyframe_rotation: 30.0_f64.to_radians(),
             max_keyframes: 16,
-            max_described: 4,
+            max_described: 8,
             max_kept: 400,
             scans_apart: 30,
             loop_distance: 0.6,
