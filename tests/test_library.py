@@ -94,7 +94,7 @@ def test_the_commands_do_all_of_it(tmp_path: Path, shell: Any) -> None:
     assert (surfsig.read(labelled).fields["instance"] == 0).sum() == instance["points"]
     assert shell("library", "remove", store, "figure").code == 0
     nothing = shell("find", "--library", store, scan)
-    assert (nothing.code, nothing.out) == (0, f"{scan}: not there\n")
+    assert (nothing.code, nothing.out) == (0, f"{scan}: not there among 0 models\n")
 
 
 @pytest.mark.parametrize(

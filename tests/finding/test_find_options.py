@@ -34,7 +34,7 @@ def test_a_mask_keeps_the_numbers_of_the_scene_s_points(found: surfsig.Instances
     assert found.sought == found.values()["models"] == 1
     points = scene.cloud.points[found[0].indices]
     assert np.linalg.norm(points - scene.poses[0][:3, 3], axis=1).max() < 0.06
-    assert 0.5 <= found[0].score <= 1.0
+    assert 0.7 <= found[0].score <= 1.0
     assert set(found[0].measures) >= {"confirmed", "contradicted", "missing", "agreement"}
 
 

@@ -69,7 +69,7 @@ impl Measures {
         let of = |part: f64| part / (self.confirmed + part).max(1e-9);
         [
             1.0,
-            self.confirmed.min(1.0).max(1e-3).ln(),
+            self.confirmed.clamp(1e-3, 1.0).ln(),
             self.visible,
             of(self.contradicted),
             of(self.missing),

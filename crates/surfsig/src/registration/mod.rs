@@ -214,7 +214,7 @@ pub fn free_space_share(
         let scans = [CenteredScan::new(source), CenteredScan::new(target)];
         let size = scans[0].size().min(scans[1].size());
         let voxel = settings.radius.unwrap_or(settings.radius_share * size) / settings.voxels_per_radius;
-        if !(voxel > 0.0) {
+        if voxel.is_nan() || voxel <= 0.0 {
             return f64::NAN;
         }
         let samples = [0, 1].map(|k| even_sample(&scans[k].points, settings.max_points, voxel));
