@@ -43,6 +43,7 @@ __all__ = [
     "find_surfaces",
     "fit_primitive",
     "free_directions",
+    "free_space_share",
     "hidden_from",
     "join_surface_pieces",
     "judge_poses",
