@@ -47,7 +47,7 @@ def terms(measures: dict[str, float]) -> list[float]:
 
     return [
         1.0,
-        np.log(max(min(confirmed, 1.0), 1e-3)),
+        np.log(max(confirmed, 1e-3)),
         measures["visible"],
         of(measures["contradicted"]),
         of(measures["missing"]),

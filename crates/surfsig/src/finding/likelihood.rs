@@ -69,7 +69,9 @@ impl Measures {
         let of = |part: f64| part / (self.confirmed + part).max(1e-9);
         [
             1.0,
-            self.confirmed.clamp(1e-3, 1.0).ln(),
+            // Above 1 where a scene is denser than what was learnt from: of two transforms that are both all but sure, the
+            // one of which more is confirmed goes first.
+            self.confirmed.max(1e-3).ln(),
             self.visible,
             of(self.contradicted),
             of(self.missing),
