@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import moving_lidar
 import moving_sensor
 import numpy as np
@@ -88,6 +90,26 @@ def test_scans_are_pushed_one_by_one_with_times(moved: tuple[list[PointCloud], A
         tracker.push(scans[0], times=[0.0])
     with pytest.raises(InvalidInputError, match="spin_rate must be"):
         surfsig.Tracker(spin_rate=0.0)
+
+
+def test_numbers_of_scans_were_taken_for_a_clock_that_begins_at_0(
+    moved: tuple[list[PointCloud], Array],
+) -> None:
+    scans = [
+        replace(cloud, fields={"time": cloud.fields["time"].astype(np.float64) + PERIOD * (number + 0.5)})
+        for number, cloud in enumerate(moved[0])
+    ]
+    found = surfsig.estimate_odometry(scans)
+    straight = list(found.deskewed(scans))
+    assert len(straight) == COUNT
+    for cloud, one, twist in zip(scans, straight, found.twists, strict=True):
+        np.testing.assert_array_equal(one.points, surfsig.deskew(cloud, twist).points)
+        # The sensor moves by some centimetres within a scan, and by metres within two seconds.
+        assert np.linalg.norm(one.points - cloud.points, axis=1).max() < 1.0
+    with pytest.raises(InvalidInputError, match="poses, but more scans"):
+        list(found.deskewed([*scans, scans[0]]))
+    with pytest.raises(InvalidInputError, match="scans"):
+        list(found.deskewed(scans[:-1]))
 
 
 def test_fields_that_are_no_times_tell_nothing() -> None:

@@ -1,6 +1,7 @@
 """Maps of many scans whose poses are known."""
 
 from collections import defaultdict
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,6 +54,15 @@ def test_normals_of_a_map_are_those_of_the_floor_and_look_to_the_sensor(
     assert np.median(normals[floor, 2]) > 0.999
     assert np.median(normals[ceiling, 2]) < -0.999
     np.testing.assert_allclose(np.linalg.norm(normals[known], axis=1), 1.0, atol=1e-5)
+
+
+def test_files_are_fused_as_clouds_are(tmp_path: Path, scans: list[PointCloud], true: Array) -> None:
+    files = [tmp_path / f"{number}.ply" for number in range(2)]
+    for file, scan in zip(files, scans, strict=False):
+        surfsig.write(file, scan)
+    expected = surfsig.fuse_scans(scans[:2], true[:2], voxel=0.3)
+    for given in (files, tmp_path, surfsig.open_scan_sequence(tmp_path)):
+        np.testing.assert_array_equal(surfsig.fuse_scans(given, true[:2], voxel=0.3).points, expected.points)
 
 
 def test_what_cannot_be_fused_is_refused(scans: list[PointCloud], true: Array) -> None:

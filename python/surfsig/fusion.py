@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
-from surfsig.arguments import positive_length, progress_callback, thread_count
+from surfsig.arguments import positive_length, progress_callback
 from surfsig.curvature import extract
 from surfsig.errors import InvalidInputError
-from surfsig.files.sequence import ScanSequence, TimedScan, open_scan_sequence
+from surfsig.files.sequence import Scans, timed_scans
 from surfsig.missing_returns import remove_missing_returns
 from surfsig.point_cloud import PointCloud
 
 _NEIGHBORS = 16
 """Nearest points of the map to which its normals are fitted: two rings about a point of a plane in voxels."""
-
-Scans = str | os.PathLike[str] | ScanSequence | Iterable[PointCloud | TimedScan | ArrayLike]
 
 
 def fuse_scans(
@@ -63,11 +60,11 @@ def fuse_scans(
     tell = progress_callback(progress)
     fused = _surfsig.FusedMap(positive_length(voxel, "voxel"))
     count = 0
-    for count, cloud in enumerate(_clouds_of(scans), start=1):
+    for count, scan in enumerate(timed_scans(scans), start=1):
         if count > len(matrices):
             raise InvalidInputError(f"there are {len(matrices)} poses, but more scans")
         if np.isfinite(matrices[count - 1]).all():
-            _add(fused, cloud, matrices[count - 1])
+            _add(fused, remove_missing_returns(scan.cloud), matrices[count - 1])
         if tell is not None:
             tell(count, len(matrices))
     if count != len(matrices):
@@ -75,17 +72,9 @@ def fuse_scans(
     cloud = _map_of(fused)
     if not len(cloud):
         return cloud
-    found = extract(cloud, neighbors=_NEIGHBORS, threads=thread_count(threads))
+    found = extract(cloud, neighbors=_NEIGHBORS, threads=threads)
     normals = dict(zip(("nx", "ny", "nz"), found.normals.T.copy(), strict=True))
     return PointCloud(cloud.offsets, cloud.origin, fields={**normals, "scans": cloud.fields["scans"]})
-
-
-def _clouds_of(scans: Scans) -> Iterable[PointCloud]:
-    """Walk through the scans, without missing returns."""
-    sequence = open_scan_sequence(scans) if isinstance(scans, (str, os.PathLike)) else scans
-    for scan in sequence:
-        cloud = scan.cloud if isinstance(scan, TimedScan) else scan
-        yield remove_missing_returns(PointCloud.of(cloud))
 
 
 def _add(fused: _surfsig.FusedMap, cloud: PointCloud, T_map_scan: NDArray[np.float64]) -> None:

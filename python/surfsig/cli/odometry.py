@@ -140,7 +140,7 @@ def odometry_command(
     if covariances is not None:
         surfsig.write_covariances(covariances, found.covariances)
     if map_file is not None:
-        surfsig.write(map_file, found.map((scan.cloud for scan in sequence), spin_rate=spin_rate))
+        surfsig.write(map_file, found.map(sequence, spin_rate=spin_rate))
     if deskewed is not None:
         _write_deskewed(deskewed, sequence, found, spin_rate)
     if report is not None:
@@ -176,7 +176,5 @@ def _write_deskewed(folder: Path, sequence: ScanSequence, found: Odometry, spin_
         )
     folder.mkdir(parents=True, exist_ok=True)
     digits = len(str(len(found)))
-    for index, scan in enumerate(sequence):
-        timestamp = None if scan.timestamp == index else scan.timestamp
-        cloud = surfsig.deskew(scan.cloud, found.twists[index], timestamp=timestamp, spin_rate=spin_rate)
+    for index, cloud in enumerate(found.deskewed(sequence, spin_rate=spin_rate)):
         surfsig.write(folder / f"{index:0{digits}d}.ply", cloud)

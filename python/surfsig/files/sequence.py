@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.paths import Paths, files_of_folder, matches, natural
@@ -71,6 +72,31 @@ class ScanSequence:
             yield from part
         except FileFormatError as error:
             warnings.warn(f"{error}; its scans end there", stacklevel=2)
+
+
+Scans = (
+    str
+    | os.PathLike[str]
+    | ScanSequence
+    | Iterable[str | os.PathLike[str] | PointCloud | TimedScan | ArrayLike]
+)
+"""What is walked through scan by scan: a path for `open_scan_sequence`, or the scans and files themselves."""
+
+
+def timed_scans(scans: Scans) -> Iterator[TimedScan]:
+    """Give each scan with its time: its number, where nobody says."""
+    walked: Any = open_scan_sequence(scans) if isinstance(scans, (str, os.PathLike)) else scans
+    if isinstance(walked, PointCloud) or not isinstance(walked, Iterable):
+        raise InvalidInputError("scans must be several clouds or files, a folder, or a bag")
+    for number, scan in enumerate(walked):
+        if isinstance(scan, TimedScan):
+            yield TimedScan(float(scan.timestamp), PointCloud.of(scan.cloud))
+        elif isinstance(scan, (str, os.PathLike)):
+            # A wrong name is the caller's mistake, not a broken scan.
+            Path(scan).stat()
+            yield TimedScan(float(number), scan_or_empty(Path(scan)))
+        else:
+            yield TimedScan(float(number), PointCloud.of(scan))
 
 
 def open_scan_sequence(paths: Paths, *, topic: str | None = None, **reading: Any) -> ScanSequence:

@@ -77,7 +77,7 @@ def _closed_chain(poses: Array, loops: list[LoopClosure], number: dict[int, int]
     arrived = poses.copy()
     for loop in loops:
         arrived[number[loop.scan]] = loop.T_world_scan_before
-    steps = _inverse(poses[:-1]) @ arrived[1:]
+    steps = geometry.inverse(poses[:-1]) @ arrived[1:]
     source = np.concatenate([np.arange(count - 1), [number[loop.earlier] for loop in loops]])
     target = np.concatenate([np.arange(1, count), [number[loop.scan] for loop in loops]])
     measured = np.concatenate([steps, [loop.T_earlier_scan for loop in loops]])
@@ -90,14 +90,13 @@ def _closed_chain(poses: Array, loops: list[LoopClosure], number: dict[int, int]
     # Rotations count by how far they move what is seen.
     scale = np.array([reach, reach, reach, 1.0, 1.0, 1.0])
     extent = reach + float(np.ptp(poses[:, :3, 3], axis=0).max())
-    inverse = _inverse(measured)
+    inverse = geometry.inverse(measured)
     for _ in range(_ITERATIONS):
-        between = _inverse(poses[source]) @ poses[target]
+        between = geometry.inverse(poses[source]) @ poses[target]
         residual = _log(inverse @ between)
-        # Of the twists d of T exp(d): d residual / d target = 1, d residual / d source = -Ad(T_target^-1
-        # T_source),
-        # but for terms of the residual's own size.
-        backward = -_adjoint(_inverse(between)) * scale[:, None] / scale
+        # Of the twists d of T exp(d): d residual / d target = 1, and d residual / d source =
+        # -Ad(T_target^-1 T_source), but for terms of the residual's own size.
+        backward = -_adjoint(geometry.inverse(between)) * scale[:, None] / scale
         step = _solve(source, target, backward, residual * scale, weight, count) / scale
         poses = poses @ np.array([geometry.exp_twist(twist) for twist in step])
         if np.abs(step * scale).max() < _CONVERGED * extent:
@@ -133,14 +132,6 @@ def _solve(
     step = np.zeros((count, 6))
     step[1:] = spsolve(normal.tocsc(), -(jacobian.T @ (weights * residual.ravel()))).reshape(-1, 6)
     return step
-
-
-def _inverse(poses: Array) -> Array:
-    """Invert poses, (n, 4, 4)."""
-    result = np.tile(np.eye(4), (len(poses), 1, 1))
-    result[:, :3, :3] = np.swapaxes(poses[:, :3, :3], 1, 2)
-    result[:, :3, 3] = -np.einsum("nij,nj->ni", result[:, :3, :3], poses[:, :3, 3])
-    return result
 
 
 def _log(poses: Array) -> Array:

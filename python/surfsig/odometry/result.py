@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.arguments import positive_length
+from surfsig.errors import InvalidInputError
+from surfsig.files.sequence import Scans, timed_scans
 from surfsig.fusion import fuse_scans
 from surfsig.odometry.loop_closing import LoopClosure
 from surfsig.odometry.point_times import deskew
@@ -127,7 +129,7 @@ class Odometry:
 
     def map(
         self,
-        scans: Iterable[PointCloud],
+        scans: Scans,
         *,
         voxel: float | None = None,
         spin_rate: float | None = None,
@@ -156,13 +158,38 @@ class Odometry:
             If the voxel is no length, or there is not one scan for each pose.
         """
         edge = positive_length(self.voxel if voxel is None else voxel, "voxel")
-        straight = (
-            deskew(cloud, self.twists[k], timestamp=float(self.timestamps[k]), spin_rate=spin_rate)
-            if k < len(self)
-            else cloud
-            for k, cloud in enumerate(scans)
-        )
+        straight = self.deskewed(scans, spin_rate=spin_rate)
         return fuse_scans(straight, self.poses_of(self.longest_segment), voxel=edge)
+
+    def deskewed(self, scans: Scans, *, spin_rate: float | None = None) -> Iterator[PointCloud]:
+        """Give the scans as they would be if the sensor had stood still at each, one by one.
+
+        Parameters
+        ----------
+        scans
+            In their order, each in its own frame, as they were followed.
+        spin_rate
+            As it was given to `estimate_odometry`.
+
+        Yields
+        ------
+        PointCloud
+            The scan itself where its points have no times, or it has no pose.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is not one scan for each pose.
+        """
+        number = -1
+        for number, scan in enumerate(timed_scans(scans)):
+            if number == len(self):
+                raise InvalidInputError(f"there are {len(self)} poses, but more scans")
+            # Numbers in place of times are no clock.
+            timestamp = None if self.timestamps[number] == number else float(self.timestamps[number])
+            yield deskew(scan.cloud, self.twists[number], timestamp=timestamp, spin_rate=spin_rate)
+        if number + 1 != len(self):
+            raise InvalidInputError(f"there are {len(self)} poses, but {number + 1} scans")
 
     @property
     def length(self) -> float:

@@ -4,26 +4,14 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sized
-from pathlib import Path
-from typing import Any
-
-from numpy.typing import ArrayLike
+from collections.abc import Callable, Sized
 
 from surfsig._surfsig import OdometrySettings
 from surfsig.arguments import progress_callback
 from surfsig.errors import InvalidInputError
-from surfsig.files.sequence import ScanSequence, TimedScan, open_scan_sequence, scan_or_empty
+from surfsig.files.sequence import Scans, open_scan_sequence, timed_scans
 from surfsig.odometry.result import Odometry
 from surfsig.odometry.tracker import Tracker
-from surfsig.point_cloud import PointCloud
-
-Scans = (
-    str
-    | os.PathLike[str]
-    | ScanSequence
-    | Iterable[str | os.PathLike[str] | PointCloud | TimedScan | ArrayLike]
-)
 
 
 def estimate_odometry(
@@ -45,11 +33,10 @@ def estimate_odometry(
     the signatures of its keypoints; a pose that is found so counts only if the map explains all of the scan,
     or the next scans follow it. Where the map leaves a motion open, as along a smooth corridor, that is named
     (`Odometry.free_directions`), its variance is infinite, and the last motion goes on in it. Where the
-    sensor
-    stays lost, another map is begun (`Odometry.segments`). Where points have times (fields `t`, `time`,
-    `timestamp`, `offset_time`, `gps_time`, or `spin_rate`), the motion within each scan is found with its
-    pose, and taken out. Nothing needs to be set, and the result is always the same. `Tracker` takes the scans
-    one by one.
+    sensor stays lost, another map is begun (`Odometry.segments`). Where points have times (fields `t`,
+    `time`, `timestamp`, `offset_time`, `gps_time`, or `spin_rate`), the motion within each scan is found with
+    its pose, and taken out. Nothing needs to be set, and the result is always the same. `Tracker` takes the
+    scans one by one.
 
     Parameters
     ----------
@@ -69,9 +56,8 @@ def estimate_odometry(
         distance within which 99 in 100 points of a scan are.
     spin_rate
         Rotations a second of a lidar that spins while it moves, where its points have no times:
-        counter-clockwise
-        about z, or negative if it spins clockwise. A scan begins and ends behind, at -x, and its pose is
-        that at its middle.
+        counter-clockwise about z, or negative if it spins clockwise. A scan begins and ends behind, at -x,
+        and its pose is that at its middle.
     close_loops
         Whether what the sensor has drifted by when it comes back to where it was is distributed over the way
         between (`Odometry.loops`).
@@ -114,7 +100,7 @@ def estimate_odometry(
     if isinstance(scans, (str, os.PathLike)):
         scans = open_scan_sequence(scans)
     total = len(scans) if isinstance(scans, Sized) else None
-    for number, scan in enumerate(_timed(scans)):
+    for number, scan in enumerate(timed_scans(scans)):
         # Numbers in place of times are no clock.
         timestamp = None if scan.timestamp == number else scan.timestamp
         tracker.push(scan.cloud, timestamp=timestamp)
@@ -129,18 +115,3 @@ def estimate_odometry(
             stacklevel=2,
         )
     return tracker.result(close_loops=close_loops)
-
-
-def _timed(scans: Any) -> Iterator[TimedScan]:
-    """Give each scan with its time: its number, where nobody says."""
-    if isinstance(scans, PointCloud) or not isinstance(scans, Iterable):
-        raise InvalidInputError("scans must be several clouds or files, a folder, or a bag")
-    for number, scan in enumerate(scans):
-        if isinstance(scan, TimedScan):
-            yield TimedScan(float(scan.timestamp), PointCloud.of(scan.cloud))
-        elif isinstance(scan, (str, os.PathLike)):
-            # A wrong name is the caller's mistake, not a broken scan.
-            Path(scan).stat()
-            yield TimedScan(float(number), scan_or_empty(Path(scan)))
-        else:
-            yield TimedScan(float(number), PointCloud.of(scan))

@@ -64,6 +64,14 @@ class Lidar:
         )
 
 
+def pixel_rays(width: int, height: int, focal: float) -> Array:
+    """Give the directions of a camera's pixels, row by row, (width * height, 3), with z component 1."""
+    x, y = np.meshgrid(
+        (np.arange(width) + 0.5 - width / 2.0) / focal, (np.arange(height) + 0.5 - height / 2.0) / focal
+    )
+    return np.stack([x, y, np.ones_like(x)], -1).reshape(-1, 3)
+
+
 @dataclass(frozen=True)
 class DepthCamera:
     """A depth camera that looks along its z axis, x to the right. Angles are in degrees, lengths in metres.
@@ -91,12 +99,7 @@ class DepthCamera:
 
     def rays(self) -> Array:
         """Give unit vectors in the camera's axes, (width * height, 3), row by row."""
-        focal = self.width / 2.0 / np.tan(np.radians(self.view) / 2.0)
-        x, y = np.meshgrid(
-            (np.arange(self.width) + 0.5 - self.width / 2.0) / focal,
-            (np.arange(self.height) + 0.5 - self.height / 2.0) / focal,
-        )
-        rays = np.stack([x, y, np.ones_like(x)], -1).reshape(-1, 3)
+        rays = pixel_rays(self.width, self.height, self.width / 2.0 / np.tan(np.radians(self.view) / 2.0))
         return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
@@ -193,10 +196,7 @@ def scan(
     directions = true_rays @ T_scene_sensor[:3, :3].T
     hits = scene.cast(np.broadcast_to(T_scene_sensor[:3, 3], rays.shape), directions)
     rng = np.random.default_rng([seed, len(rays)])
-    noise, luck = rng.normal(size=len(rays)), rng.random(len(rays))
-    met = (hits.t < sensor.max_range) & (luck >= sensor.dropout)
-    if not met.any():
-        raise InvalidInputError("the sensor meets nothing of the scene")
+    noise, met = _drawn(rng, hits.t, sensor)
     ranges = hits.t
     if calibration is not None:
         width = sensor.steps if isinstance(sensor, Lidar) else sensor.width
@@ -245,10 +245,7 @@ def scan_moving(
     at = T_scene_sensor[step]
     hits = scene.cast(at[:, :3, 3], np.einsum("nij,nj->ni", at[:, :3, :3], rays))
     rng = np.random.default_rng([seed, len(rays)])
-    noise, luck = rng.normal(size=len(rays)), rng.random(len(rays))
-    met = (hits.t < sensor.max_range) & (luck >= sensor.dropout)
-    if not met.any():
-        raise InvalidInputError("the sensor meets nothing of the scene")
+    noise, met = _drawn(rng, hits.t, sensor)
     ranges = hits.t[met] + sensor.noise * noise[met]
     times = period * (step / sensor.steps - 0.5)
     return PointCloud(
@@ -256,6 +253,17 @@ def scan_moving(
         viewpoint=np.zeros(3),
         fields={"time": times[met].astype(np.float32)},
     )
+
+
+def _drawn(
+    rng: np.random.Generator, ranges: Array, sensor: Lidar | DepthCamera
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Draw a normal number for each ray, and which rays have a return."""
+    noise, luck = rng.normal(size=len(ranges)), rng.random(len(ranges))
+    met = (ranges < sensor.max_range) & (luck >= sensor.dropout)
+    if not met.any():
+        raise InvalidInputError("the sensor meets nothing of the scene")
+    return noise, met
 
 
 def _mixed(

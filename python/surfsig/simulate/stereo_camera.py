@@ -13,6 +13,7 @@ from ..geometry import pose_array, rotate, transform_points
 from ..point_cloud import PointCloud
 from .poses import Array
 from .scene import Scene
+from .sensors import pixel_rays
 
 _FEWEST_SMOOTHED = 0.5
 """Weight of the measured pixels in the smoothing window, below which a pixel is not smoothed."""
@@ -71,11 +72,7 @@ class StereoCamera:
 
     def rays(self) -> Array:
         """Give the directions of the pixels, row by row, (width * height, 3), with z component 1."""
-        x, y = np.meshgrid(
-            (np.arange(self.width) + 0.5 - self.width / 2.0) / self.focal,
-            (np.arange(self.height) + 0.5 - self.height / 2.0) / self.focal,
-        )
-        return np.stack([x, y, np.ones_like(x)], -1).reshape(-1, 3)
+        return pixel_rays(self.width, self.height, self.focal)
 
     def scan(
         self,
