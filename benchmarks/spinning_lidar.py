@@ -30,7 +30,7 @@ PERIOD = 0.1
 """Seconds of a scan."""
 LIDAR = simulate.Lidar(lines=32, steps=600, elevation=(-22.0, 12.0), noise=0.01, max_range=80.0)
 COLUMNS = (
-    "motion", "scans", "way", "error at the end, of the way", "largest", "the same without times",
+    "motion", "scans", "path", "error at the end, of the path", "largest", "the same without times",
     "KISS-ICP with times, at the end", "processor time a scan: surfsig", "KISS-ICP",
 )  # fmt: skip
 MOTIONS = {
