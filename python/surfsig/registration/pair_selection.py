@@ -23,6 +23,9 @@ _LONGEST_LOOP = 4
 ones more often, and errors add up."""
 _SAMPLE = 500
 """Points of a scan that tell by how much two poses differ."""
+_SAME = 0.1
+"""Part of the distance up to which two poses agree by which a pose may change before free space is measured
+again: it takes seconds, and of most pairs the poses stay as they are when a pair elsewhere is left out."""
 
 
 class PairSelection:
@@ -55,6 +58,8 @@ class PairSelection:
         self._found = found
         self._free_space = free_space
         self._doubted_share = doubted_share
+        # Of each source and target the pose at which free space was measured last, and its share.
+        self._measured: dict[tuple[int, int], tuple[Array, float]] = {}
         rng = np.random.default_rng(1)
         self._samples = []
         for scan in scans:
@@ -137,9 +142,18 @@ class PairSelection:
         for target, source in itertools.combinations(joined, 2):
             implied = geometry.inverse(poses[target]) @ poses[source]
             is_measured = frozenset((source, target)) in measured
-            if not is_measured and self._free_space(source, target, implied) > self._doubted_share:
+            if not is_measured and self._share(source, target, implied) > self._doubted_share:
                 found.append((source, target))
         return found
+
+    def _share(self, source: int, target: int, pose: Array) -> float:
+        """Give the share of points in free space at a pose, or at one that is nearly the same."""
+        last = self._measured.get((source, target))
+        radius = min(result.radius for *_, result in self._found)
+        if last is None or self._apart(source, pose, last[0]) > _SAME * self._agree * radius:
+            last = pose, self._free_space(source, target, pose)
+            self._measured[source, target] = last
+        return last[1]
 
     def _confirmed(self, used: set[int], refused: set[int]) -> set[int]:
         """Give pairs that are not trusted, but close a loop, and that nothing speaks against."""
