@@ -18,6 +18,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -155,10 +156,10 @@ def sample(surface: Surface, radius: float, folder: Path) -> Sample:
     points = points_of(folder / surface.file)
     member, outward = surface.find(points)
 
+    tree = cKDTree(points)
+
     def pure(place: int) -> bool:
-        slab = np.abs(points[:, 0] - points[place, 0]) < radius
-        near = np.sum((points[slab] - points[place]) ** 2, axis=1) < radius**2
-        return bool(member[slab][near].mean() >= PURE)
+        return bool(member[tree.query_ball_point(points[place], radius)].mean() >= PURE)
 
     shuffled = np.random.default_rng(SEED).permutation(np.flatnonzero(member))
     at = np.array(list(itertools.islice(filter(pure, shuffled), 4 * PLACES)))
