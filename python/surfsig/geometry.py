@@ -9,8 +9,8 @@ translation. The core's `RigidTransform` has the same conventions. Here all is N
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from surfsig.errors import InvalidInputError
 
@@ -83,7 +83,7 @@ def orthonormal(pose: Array) -> Array:
     (4, 4): a pose.
     """
     result = pose.copy()
-    result[:3, :3] = Rotation.from_matrix(pose[:3, :3]).as_matrix()
+    result[:3, :3] = scipy.spatial.transform.Rotation.from_matrix(pose[:3, :3]).as_matrix()
     return result
 
 
@@ -174,7 +174,7 @@ def from_rotation_vector(rotation_vector: Array, translation: Array) -> Array:
     (4, 4), or (n, 4, 4).
     """
     pose = np.zeros((*np.shape(rotation_vector)[:-1], 4, 4))
-    pose[..., :3, :3] = Rotation.from_rotvec(rotation_vector).as_matrix()
+    pose[..., :3, :3] = scipy.spatial.transform.Rotation.from_rotvec(rotation_vector).as_matrix()
     pose[..., :3, 3] = translation
     pose[..., 3, 3] = 1.0
     return pose
@@ -238,7 +238,7 @@ def log_pose(pose: Array) -> Array:
     -------
     (6,): rotation vector in radians, then translation.
     """
-    vector = Rotation.from_matrix(pose[:3, :3]).as_rotvec()
+    vector = scipy.spatial.transform.Rotation.from_matrix(pose[:3, :3]).as_rotvec()
     angle = float(np.linalg.norm(vector))
     square = angle * angle
     if angle < _SMALL_ANGLE:
@@ -291,7 +291,7 @@ def rotation_angle(pose: Array) -> float:
     -------
     Radians, 0 to pi.
     """
-    return float(Rotation.from_matrix(pose[:3, :3]).magnitude())
+    return float(scipy.spatial.transform.Rotation.from_matrix(pose[:3, :3]).magnitude())
 
 
 def skew(vector: Array) -> Array:
@@ -345,7 +345,7 @@ def fit_transform(source: Array, target: Array) -> Array:
     T_target_source, (4, 4).
     """
     ours, theirs = source.mean(axis=0), target.mean(axis=0)
-    rotation, _ = Rotation.align_vectors(target - theirs, source - ours)
+    rotation, _ = scipy.spatial.transform.Rotation.align_vectors(target - theirs, source - ours)
     pose = np.eye(4)
     pose[:3, :3] = rotation.as_matrix()
     pose[:3, 3] = theirs - pose[:3, :3] @ ours

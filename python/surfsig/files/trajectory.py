@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from surfsig.errors import FileFormatError, InvalidInputError
 from surfsig.files.atomic import replacing
@@ -93,7 +93,11 @@ def write_trajectory(
     else:
         known = np.isfinite(matrices).all(axis=(1, 2))
         kept = matrices[known]
-        turns = Rotation.from_matrix(kept[:, :3, :3]).as_quat() if len(kept) else np.zeros((0, 4))
+        turns = (
+            scipy.spatial.transform.Rotation.from_matrix(kept[:, :3, :3]).as_quat()
+            if len(kept)
+            else np.zeros((0, 4))
+        )
         rows = np.column_stack([times[known], kept[:, :3, 3], turns])
     _write_rows(path, rows)
 
@@ -169,6 +173,6 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
         return Trajectory(np.arange(len(table), dtype=np.float64), poses)
     if not (np.isfinite(table).all() and np.linalg.norm(table[:, 4:], axis=1).all()):
         raise FileFormatError(f"{path}: a pose is not finite, or its quaternion is 0")
-    poses[:, :3, :3] = Rotation.from_quat(table[:, 4:]).as_matrix()
+    poses[:, :3, :3] = scipy.spatial.transform.Rotation.from_quat(table[:, 4:]).as_matrix()
     poses[:, :3, 3] = table[:, 1:4]
     return Trajectory(table[:, 0].copy(), poses)

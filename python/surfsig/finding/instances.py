@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.cloud_transforms import transform_cloud
@@ -251,7 +251,9 @@ class Instances:
         )
         rows: list[tuple[str, ...]] = []
         for number, instance in enumerate(self.instances):
-            turn = Rotation.from_matrix(instance.T_scene_model[:3, :3]).as_rotvec(degrees=True)
+            turn = scipy.spatial.transform.Rotation.from_matrix(instance.T_scene_model[:3, :3]).as_rotvec(
+                degrees=True
+            )
             rows.append(
                 (
                     f"{number}",
@@ -352,7 +354,7 @@ class Instances:
 
 def _quaternion(pose: Array) -> list[float]:
     """Give a pose's rotation as x, y, z, w, as ROS has it."""
-    return [float(value) for value in Rotation.from_matrix(pose[:3, :3]).as_quat()]
+    return [float(value) for value in scipy.spatial.transform.Rotation.from_matrix(pose[:3, :3]).as_quat()]
 
 
 def _with_digits(instance: Instance) -> str:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.geometry import axes_across, from_rotation_vector, transform_points
@@ -83,7 +83,7 @@ def equal_surfaces(found: Sequence[Surfaces], confidence: float) -> list[EqualSu
         members = [found[scan].surfaces[number] for scan, number in keys]
         sizes = np.array([[getattr(surface, name) for name in names] for surface in members])
         errors = np.array([[getattr(surface, f"{name}_std") for name in names] for surface in members])
-        limit = float(chi2.ppf(confidence, len(names)))
+        limit = float(scipy.stats.chi2.ppf(confidence, len(names)))
         for rows in _joined(sizes, errors, limit):
             if len(rows) > 1:
                 pooled = _pooled(sizes[rows], errors[rows])

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 
@@ -44,7 +42,7 @@ def pieces_of(
     The points' numbers of each piece, ascending, by their first ones; and the numbers of the planes that are
     supports, the largest first.
     """
-    links = cKDTree(points).query_pairs(_LINK * spacing, output_type="ndarray")
+    links = scipy.spatial.cKDTree(points).query_pairs(_LINK * spacing, output_type="ndarray")
     support = np.zeros(len(points), np.bool_)
     supports = []
     for number in sorted(range(len(planes)), key=lambda number: -_extent(points[planes[number][0]])):
@@ -92,8 +90,10 @@ def _connected(
     number[chosen] = np.arange(len(chosen))
     ends = number[links]
     ends = ends[(ends >= 0).all(axis=1)]
-    graph = coo_array((np.ones(len(ends), np.bool_), (ends[:, 0], ends[:, 1])), shape=(len(chosen),) * 2)
-    _, label = connected_components(graph, directed=False)
+    graph = scipy.sparse.coo_array(
+        (np.ones(len(ends), np.bool_), (ends[:, 0], ends[:, 1])), shape=(len(chosen),) * 2
+    )
+    _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
     sizes = np.bincount(label, minlength=1)
     order = np.argsort(label, kind="stable")
     parts = np.split(chosen[order], np.cumsum(sizes)[:-1]) if len(chosen) else []

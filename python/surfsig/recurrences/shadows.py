@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, Delaunay, cKDTree
 
 from surfsig.visibility import hidden_from
 
@@ -54,8 +54,8 @@ def places_without_points(support: Array, spacing: float) -> Array:
     flat = (support - middle) @ axes.T
     x, y = (np.arange(*ends, 2.0 * spacing) for ends in zip(flat.min(axis=0), flat.max(axis=0), strict=True))
     grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    gap, _ = cKDTree(flat).query(grid, distance_upper_bound=_LINK * spacing)
-    inside = Delaunay(flat[ConvexHull(flat).vertices]).find_simplex(grid) >= 0
+    gap, _ = scipy.spatial.cKDTree(flat).query(grid, distance_upper_bound=_LINK * spacing)
+    inside = scipy.spatial.Delaunay(flat[scipy.spatial.ConvexHull(flat).vertices]).find_simplex(grid) >= 0
     return np.asarray(middle + grid[np.isinf(gap) & inside] @ axes)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from .poses import Array, pose, turn
 from .scene import Placed, Scene
@@ -292,7 +292,7 @@ def upright_pose(x: float, y: float, height: float, yaw: float, tilt: Sequence[f
     (4, 4), T_scene_sensor.
     """
     result = np.eye(4)
-    result[:3, :3] = Rotation.from_euler("ZYX", [yaw, *tilt]).as_matrix()
+    result[:3, :3] = scipy.spatial.transform.Rotation.from_euler("ZYX", [yaw, *tilt]).as_matrix()
     result[:3, 3] = (x, y, height)
     return result
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import gaussian_filter
 
 from ..errors import InvalidInputError
 from ..geometry import pose_array, rotate, transform_points
@@ -151,7 +151,7 @@ class StereoCamera:
         """Give noise of standard deviation 1 that is alike over some pixels, (height, width)."""
         noise = rng.normal(size=(self.height, self.width))
         if width > 0.0:
-            noise = gaussian_filter(noise, width, mode="wrap")
+            noise = scipy.ndimage.gaussian_filter(noise, width, mode="wrap")
             noise /= noise.std()
         return np.asarray(noise)
 
@@ -175,8 +175,8 @@ class StereoCamera:
         if self.smoothing == 0.0:
             return disparity
         known = np.isfinite(disparity)
-        weight = gaussian_filter(known.astype(np.float64), self.smoothing)
-        total = gaussian_filter(np.where(known, disparity, 0.0), self.smoothing)
+        weight = scipy.ndimage.gaussian_filter(known.astype(np.float64), self.smoothing)
+        total = scipy.ndimage.gaussian_filter(np.where(known, disparity, 0.0), self.smoothing)
         with np.errstate(divide="ignore", invalid="ignore"):
             mean = total / weight
         apart = self._is_outline(disparity, 2.0 * self.smoothing)
@@ -200,4 +200,4 @@ class StereoCamera:
             difference = np.abs(np.diff(filled, axis=axis)) > _OUTLINE
             pad = [(0, 1) if k == axis else (0, 0) for k in (0, 1)]
             step += np.pad(difference, pad)
-        return np.asarray(gaussian_filter(np.minimum(step, 1.0), max(0.5 * reach, 0.5)) > 0.05)
+        return np.asarray(scipy.ndimage.gaussian_filter(np.minimum(step, 1.0), max(0.5 * reach, 0.5)) > 0.05)
