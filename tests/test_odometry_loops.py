@@ -41,11 +41,19 @@ def test_a_loop_takes_the_drift_of_its_way() -> None:
     # Where a loop is closed, the scan's pose is that by the earlier one.
     given = wrong.copy()
     given[79] = true[79]
-    found = closed(given, np.zeros(80, np.int64), [loop], 8.0)
+    walk = np.arange(80.0)[:, None, None] * np.diag([1e-6] * 3 + [1e-4] * 3)
+    # The last one is known as well as the first.
+    walk[79] = walk[1]
+    found, covariances = closed(given, walk, np.zeros(80, np.int64), [loop], 8.0)
     before = np.linalg.norm(wrong[:, :3, 3] - true[:, :3, 3], axis=1)
     after = np.linalg.norm(found[:, :3, 3] - true[:, :3, 3], axis=1)
     assert after[-1] < 0.05 * before[-1]
     assert after.max() < 0.35 * before.max()
+    # The middle is known from both ends: half of the variance of one, and less as directions are known, too.
+    assert 0.25 < covariances[40, 3:, 3:].trace() / walk[40, 3:, 3:].trace() < 0.55
+    assert 0.2 < covariances[40, :3, :3].trace() / walk[40, :3, :3].trace() < 0.55
+    np.testing.assert_allclose(covariances[79], walk[79], rtol=0.1)
+    assert (np.diagonal(covariances, axis1=1, axis2=2) <= np.diagonal(walk, axis1=1, axis2=2)).all()
     np.testing.assert_allclose(found[0], true[0], atol=1e-12)
     for pose in found:
         np.testing.assert_allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-9)
@@ -53,7 +61,7 @@ def test_a_loop_takes_the_drift_of_its_way() -> None:
     frame = simulate.upright_pose(300.0, -20.0, 5.0, 1.1, (0.2, 0.1))
     moved = LoopClosure(79, 0, loop.T_earlier_scan, frame @ wrong[79])
     np.testing.assert_allclose(
-        closed(frame @ given, np.zeros(80, np.int64), [moved], 8.0), frame @ found, atol=1e-6
+        closed(frame @ given, walk, np.zeros(80, np.int64), [moved], 8.0)[0], frame @ found, atol=1e-6
     )
 
 
@@ -64,11 +72,14 @@ def test_segments_without_a_loop_and_scans_without_a_pose_stay() -> None:
     segments = np.repeat([0, 1], [20, 20])
     segments[5] = -1
     loop = LoopClosure(19, 0, geometry.inverse(given[0]) @ true[19], given[19])
-    found = closed(given, segments, [loop], 5.0)
+    none = np.tile(np.diag([np.inf] + [1.0] * 5), (40, 1, 1))
+    found, covariances = closed(given, none, segments, [loop], 5.0)
+    np.testing.assert_array_equal(covariances[20:], none[20:])
+    assert np.isinf(covariances[:20, 0, 0][covariances[:20, 1, 1] > 0.0]).all()
     np.testing.assert_array_equal(found[20:], given[20:])
     assert np.isnan(found[5]).all()
     assert np.abs(found[19] - given[19]).max() > 1e-3
-    np.testing.assert_array_equal(closed(given, segments, [], 5.0), given)
+    np.testing.assert_array_equal(closed(given, none, segments, [], 5.0)[0], given)
 
 
 @pytest.mark.slow

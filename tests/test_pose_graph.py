@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from surfsig import geometry
-from surfsig.registration.pose_graph import Edge, solve
+from surfsig.alignment.pose_graph import Edge, PoseGraph, solve
 
 NOISE = np.array([2e-3, 1e-3, 3e-3, 0.01, 0.02, 0.015])
 
@@ -104,3 +105,43 @@ def test_a_motion_that_no_edge_determines_has_an_infinite_variance() -> None:
     # With another edge that knows it, nothing is open.
     whole = solve(3, 0, [known, slides, edge(poses, 2, 0, 9)])
     assert np.isfinite(whole.covariance).all()
+
+
+@pytest.mark.parametrize("robust", [None, 3.0])
+def test_poses_and_covariances_are_those_of_dense_least_squares(robust: float | None) -> None:
+    """With derivatives by differences, and SciPy's least squares with its own robust loss."""
+    true = truth(5, 11)
+    edges = [edge(true, a, b, 12, noise=2.0) for a, b in PAIRS]
+    graph = PoseGraph(
+        np.array([one.source for one in edges]),
+        np.array([one.target for one in edges]),
+        np.array([one.T_target_source for one in edges]),
+        np.array([one.information for one in edges]),
+        np.array([one.center for one in edges]),
+        first=2,
+        robust=robust,
+    )
+
+    def moved(unknowns: np.ndarray) -> np.ndarray:
+        twists = np.zeros((5, 6))
+        twists[[0, 1, 3, 4]] = unknowns.reshape(4, 6)
+        return np.asarray(found @ geometry.exp_twist(twists))
+
+    found = graph.fit(true)
+    slow = least_squares(
+        lambda unknowns: graph.residuals(moved(unknowns)).ravel(),
+        np.zeros(24),
+        jac="3-point",
+        x_scale="jac",
+        loss="linear" if robust is None else "soft_l1",
+        f_scale=3.0,
+    )
+    # In units of the noise: differences leave some thousandths of it.
+    assert np.abs(slow.x.reshape(4, 6) / NOISE).max() < 0.02
+    expected = np.linalg.inv(slow.jac.T @ slow.jac)
+    covariances = graph.covariances(found, np.arange(5))
+    assert not covariances[2].any()
+    for place, scan in enumerate([0, 1, 3, 4]):
+        own = slice(6 * place, 6 * place + 6)
+        scale = np.sqrt(np.outer(np.diag(expected)[own], np.diag(expected)[own]))
+        assert np.abs((covariances[scan] - expected[own, own]) / scale).max() < 0.01

@@ -207,21 +207,27 @@ def exp_twist(twist: Array) -> Array:
     Parameters
     ----------
     twist
-        (6,): rotation vector in radians, then translation.
+        Rotation vector in radians, then translation: (6,), or many, (n, 6).
 
     Returns
     -------
-    (4, 4).
+    (4, 4), or (n, 4, 4).
     """
-    vector, velocity = twist[:3], twist[3:]
-    angle = float(np.linalg.norm(vector))
+    vector, velocity = twist[..., :3], twist[..., 3:]
+    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
     square = angle * angle
-    if angle < _SMALL_ANGLE:
-        first = _series(square, 1 / 2, -1 / 24, 1 / 720, -1 / 40_320, 1 / 3_628_800)
-        second = _series(square, 1 / 6, -1 / 120, 1 / 5040, -1 / 362_880, 1 / 39_916_800)
-    else:
-        first = 2.0 * np.sin(0.5 * angle) ** 2 / square
-        second = (angle - np.sin(angle)) / (square * angle)
+    is_small = angle < _SMALL_ANGLE
+    large = np.where(is_small, 1.0, angle)
+    first = np.where(
+        is_small,
+        _series(square, 1 / 2, -1 / 24, 1 / 720, -1 / 40_320, 1 / 3_628_800),
+        2.0 * np.sin(0.5 * large) ** 2 / large**2,
+    )
+    second = np.where(
+        is_small,
+        _series(square, 1 / 6, -1 / 120, 1 / 5040, -1 / 362_880, 1 / 39_916_800),
+        (large - np.sin(large)) / large**3,
+    )
     along = np.cross(vector, velocity)
     return from_rotation_vector(vector, velocity + first * along + second * np.cross(vector, along))
 
@@ -232,27 +238,31 @@ def log_pose(pose: Array) -> Array:
     Parameters
     ----------
     pose
-        (4, 4).
+        (4, 4), or many, (n, 4, 4).
 
     Returns
     -------
-    (6,): rotation vector in radians, then translation.
+    (6,), or (n, 6): rotation vector in radians, then translation.
     """
-    vector = scipy.spatial.transform.Rotation.from_matrix(pose[:3, :3]).as_rotvec()
-    angle = float(np.linalg.norm(vector))
+    vector = scipy.spatial.transform.Rotation.from_matrix(pose[..., :3, :3]).as_rotvec()
+    translation = pose[..., :3, 3]
+    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
     square = angle * angle
-    if angle < _SMALL_ANGLE:
-        coefficient = _series(square, 1 / 12, 1 / 720, 1 / 30_240, 1 / 1_209_600, 1 / 47_900_160)
-    else:
-        coefficient = (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / square
-    along = np.cross(vector, pose[:3, 3])
-    velocity = pose[:3, 3] - 0.5 * along + coefficient * np.cross(vector, along)
-    return np.concatenate([vector, velocity])
+    is_small = angle < _SMALL_ANGLE
+    large = np.where(is_small, 1.0, angle)
+    coefficient = np.where(
+        is_small,
+        _series(square, 1 / 12, 1 / 720, 1 / 30_240, 1 / 1_209_600, 1 / 47_900_160),
+        (1.0 - 0.5 * large / np.tan(0.5 * large)) / large**2,
+    )
+    along = np.cross(vector, translation)
+    velocity = translation - 0.5 * along + coefficient * np.cross(vector, along)
+    return np.concatenate([vector, velocity], axis=-1)
 
 
-def _series(x: float, *coefficients: float) -> float:
+def _series(x: Array, *coefficients: float) -> Array:
     """Evaluate a polynomial, by Horner's rule."""
-    result = 0.0
+    result = np.zeros_like(x)
     for coefficient in reversed(coefficients):
         result = result * x + coefficient
     return result
@@ -266,16 +276,16 @@ def adjoint(pose: Array) -> Array:
     Parameters
     ----------
     pose
-        T_target_source, (4, 4).
+        T_target_source, (4, 4), or many, (n, 4, 4).
 
     Returns
     -------
-    (6, 6).
+    (6, 6), or (n, 6, 6).
     """
-    rotation = pose[:3, :3]
-    result = np.zeros((6, 6))
-    result[:3, :3] = result[3:, 3:] = rotation
-    result[3:, :3] = skew(pose[:3, 3]) @ rotation
+    rotation = pose[..., :3, :3]
+    result = np.zeros((*pose.shape[:-2], 6, 6))
+    result[..., :3, :3] = result[..., 3:, 3:] = rotation
+    result[..., 3:, :3] = skew(pose[..., :3, 3]) @ rotation
     return result
 
 
@@ -300,14 +310,17 @@ def skew(vector: Array) -> Array:
     Parameters
     ----------
     vector
-        (3,).
+        (3,), or many, (n, 3).
 
     Returns
     -------
-    (3, 3).
+    (3, 3), or (n, 3, 3).
     """
-    x, y, z = vector
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    result = np.zeros((*vector.shape, 3))
+    for k in range(3):
+        result[..., (k + 2) % 3, (k + 1) % 3] = vector[..., k]
+        result[..., (k + 1) % 3, (k + 2) % 3] = -vector[..., k]
+    return result
 
 
 def axes_across(direction: Array) -> tuple[Array, Array]:

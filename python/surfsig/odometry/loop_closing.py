@@ -1,7 +1,6 @@
 """Loops that close: what a way around has drifted by is distributed over its scans.
 
-A pose graph of all scans in a chain, of thousands of poses: so the normal equations are sparse, and
-derivatives are written down, other than in the registration of some scans in one frame.
+A pose graph of all scans in a chain and of the loops, in which the errors of steps are a random walk.
 """
 
 from __future__ import annotations
@@ -11,21 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.linalg import spsolve
-from scipy.spatial.transform import Rotation
 
 from surfsig import geometry
+from surfsig.alignment.pose_graph import PoseGraph
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-_ITERATIONS = 10
-"""Steps of Gauss and Newton, at most: drift is small, and two or three do."""
-_CONVERGED = 1e-9
-"""Of the trajectory's extent, below which the largest step has converged."""
 _STANDING = 0.01
 """Part of the range by which the error of a scan grows that has not moved."""
+_COVARIANCES = 64
+"""Scans of a segment, at most, whose covariances are computed anew; those between are interpolated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,13 +37,17 @@ class LoopClosure:
     """(4, 4), the scan's pose by the way around; its difference to that by the earlier scan is the drift."""
 
 
-def closed(poses: Array, segments: Integers, loops: Sequence[LoopClosure], reach: float) -> Array:
+def closed(
+    poses: Array, covariances: Array, segments: Integers, loops: Sequence[LoopClosure], reach: float
+) -> tuple[Array, Array]:
     """Fit poses to the motions from scan to scan and to the loops.
 
     Parameters
     ----------
     poses
         (n, 4, 4), each in the world of its segment; NaN where there is none.
+    covariances
+        (n, 6, 6), of the twist of each pose, as they were known when the scans came.
     segments
         (n,), -1 where there is no pose.
     loops
@@ -58,94 +57,81 @@ def closed(poses: Array, segments: Integers, loops: Sequence[LoopClosure], reach
 
     Returns
     -------
-    numpy.ndarray
-        (n, 4, 4). The first pose of each segment stays, and so do segments without a loop.
+    Poses (n, 4, 4) and covariances (n, 6, 6). The first pose of each segment stays, and so do segments
+    without a loop.
     """
-    poses = poses.copy()
+    poses, covariances = poses.copy(), covariances.copy()
     for segment in sorted({int(segments[loop.scan]) for loop in loops} - {-1}):
         nodes = np.flatnonzero(segments == segment)
         number = {int(scan): k for k, scan in enumerate(nodes)}
         own = [loop for loop in loops if loop.scan in number and loop.earlier in number]
         if own and len(nodes) > 1:
-            poses[nodes] = _closed_chain(poses[nodes], own, number, reach)
-    return poses
+            chain = _Chain(poses[nodes], own, number, reach)
+            poses[nodes] = chain.closed()
+            covariances[nodes] = chain.factors(poses[nodes]) * covariances[nodes]
+    return poses, covariances
 
 
-def _closed_chain(poses: Array, loops: list[LoopClosure], number: dict[int, int], reach: float) -> Array:
-    """Close the loops of one segment, whose scans have numbers 0, 1, ... in it."""
-    count = len(poses)
-    arrived = poses.copy()
-    for loop in loops:
-        arrived[number[loop.scan]] = loop.T_world_scan_before
-    steps = geometry.inverse(poses[:-1]) @ arrived[1:]
-    source = np.concatenate([np.arange(count - 1), [number[loop.earlier] for loop in loops]])
-    target = np.concatenate([np.arange(1, count), [number[loop.scan] for loop in loops]])
-    measured = np.concatenate([steps, [loop.T_earlier_scan for loop in loops]])
-    # A random walk: the variance of a step is as its length, and a loop counts as one step of the usual
-    # length does.
-    moved = _log(steps)
-    length = np.linalg.norm(moved[:, 3:], axis=1) + reach * np.linalg.norm(moved[:, :3], axis=1)
-    variance = length + _STANDING * reach
-    weight = 1.0 / np.concatenate([variance, np.full(len(loops), np.median(variance))])
-    # Rotations count by how far they move what is seen.
-    scale = np.array([reach, reach, reach, 1.0, 1.0, 1.0])
-    extent = reach + float(np.ptp(poses[:, :3, 3], axis=0).max())
-    inverse = geometry.inverse(measured)
-    for _ in range(_ITERATIONS):
-        between = geometry.inverse(poses[source]) @ poses[target]
-        residual = _log(inverse @ between)
-        # Of the twists d of T exp(d): d residual / d target = 1, and d residual / d source =
-        # -Ad(T_target^-1 T_source), but for terms of the residual's own size.
-        backward = -_adjoint(geometry.inverse(between)) * scale[:, None] / scale
-        step = _solve(source, target, backward, residual * scale, weight, count) / scale
-        poses = poses @ np.array([geometry.exp_twist(twist) for twist in step])
-        if np.abs(step * scale).max() < _CONVERGED * extent:
-            break
-    return poses
+class _Chain:
+    """The scans of one segment, which have numbers 0, 1, ... in it, and their loops."""
 
+    def __init__(self, poses: Array, loops: list[LoopClosure], number: dict[int, int], reach: float) -> None:
+        self._poses = poses
+        count = len(poses)
+        arrived = poses.copy()
+        for loop in loops:
+            arrived[number[loop.scan]] = loop.T_world_scan_before
+        self._loops = {number[loop.scan]: number[loop.earlier] for loop in loops}
+        self._steps = geometry.inverse(poses[:-1]) @ arrived[1:]
+        # A random walk: the variance of a step is as its length, and a loop counts as one step of the usual
+        # length does. Rotations count by how far they move what is seen.
+        moved = geometry.log_pose(self._steps)
+        length = np.linalg.norm(moved[:, 3:], axis=1) + reach * np.linalg.norm(moved[:, :3], axis=1)
+        variance = length + _STANDING * reach
+        unit = np.array([1.0 / reach] * 3 + [1.0] * 3) ** 2
+        self._of_steps = variance[:, None] * unit
+        self._of_loop = float(np.median(variance)) * unit
+        measured = np.concatenate([self._steps, [loop.T_earlier_scan for loop in loops]])
+        of_edges = np.concatenate([self._of_steps, np.tile(self._of_loop, (len(loops), 1))])
+        self._graph = PoseGraph(
+            np.concatenate([np.arange(1, count), [number[loop.scan] for loop in loops]]),
+            np.concatenate([np.arange(count - 1), [number[loop.earlier] for loop in loops]]),
+            measured,
+            np.eye(6) / of_edges[:, :, None],
+            # About where the later scan is.
+            measured[:, :3, 3],
+            first=0,
+            robust=None,
+            reach=reach,
+        )
 
-def _solve(
-    source: Integers, target: Integers, backward: Array, residual: Array, weight: Array, count: int
-) -> Array:
-    """Solve the normal equations of all poses but the first, which stays; (count, 6)."""
-    edges = len(source)
-    row = np.repeat(np.arange(6 * edges), 6).reshape(edges, 6, 6)
-    across = np.tile(np.arange(6), (edges, 6, 1))
-    forward = np.tile(np.eye(6), (edges, 1, 1))
-    jacobian = coo_matrix(
-        (
-            np.concatenate([forward.ravel(), backward.ravel()]),
-            (
-                np.concatenate([row.ravel(), row.ravel()]),
-                np.concatenate(
-                    [
-                        (6 * target[:, None, None] + across).ravel(),
-                        (6 * source[:, None, None] + across).ravel(),
-                    ]
-                ),
-            ),
-        ),
-        shape=(6 * edges, 6 * count),
-    ).tocsc()[:, 6:]
-    weights = np.repeat(weight, 6)
-    normal = jacobian.T @ jacobian.multiply(weights[:, None]).tocsc()
-    step = np.zeros((count, 6))
-    step[1:] = spsolve(normal.tocsc(), -(jacobian.T @ (weights * residual.ravel()))).reshape(-1, 6)
-    return step
+    def closed(self) -> Array:
+        """Give the poses that agree best with steps and loops."""
+        return self._graph.fit(self._poses)
 
+    def factors(self, poses: Array) -> Array:
+        """Give what the loops that came later make of covariances, (n, 6, 6): factors of their entries.
 
-def _log(poses: Array) -> Array:
-    """Give the twists of poses, (n, 6), to the second order of their rotation."""
-    vector = Rotation.from_matrix(poses[:, :3, :3]).as_rotvec()
-    translation = poses[:, :3, 3]
-    return np.concatenate([vector, translation - 0.5 * np.cross(vector, translation)], axis=1)
+        Each scan's covariance is that of the steps and loops before it. Those after it take the same share of
+        it as they do of a random walk's covariance, of rotations and translations.
+        """
+        some = np.unique(np.linspace(0, len(poses) - 1, min(len(poses), _COVARIANCES)).astype(np.int64))
+        deviations = []
+        for covariances in (self._graph.covariances(poses, some), self._when_it_came()[some]):
+            diagonal = np.einsum("nii->ni", covariances)
+            deviations.append(np.sqrt(np.column_stack([diagonal[:, :3].sum(1), diagonal[:, 3:].sum(1)])))
+        after, before = deviations
+        share = np.divide(after, before, out=np.ones_like(after), where=before > 0.0).clip(0.0, 1.0)
+        every = np.arange(len(poses))
+        root = np.column_stack([np.interp(every, some, share[:, part]) for part in (0, 0, 0, 1, 1, 1)])
+        return np.asarray(root[:, :, None] * root[:, None, :])
 
-
-def _adjoint(poses: Array) -> Array:
-    """Give the matrices (n, 6, 6) that take twists, rotation first, to other axes."""
-    rotation, translation = poses[:, :3, :3], poses[:, :3, 3]
-    result = np.zeros((len(poses), 6, 6))
-    result[:, :3, :3] = result[:, 3:, 3:] = rotation
-    # [t]x R: each column of R is crossed.
-    result[:, 3:, :3] = np.cross(translation[:, :, None], rotation, axisa=1, axisb=1, axisc=1)
-    return result
+    def _when_it_came(self) -> Array:
+        """Give the covariances of a random walk with the loops up to each scan, (n, 6, 6)."""
+        result = np.zeros((len(self._poses), 6, 6))
+        for scan in range(1, len(result)):
+            earlier = self._loops.get(scan, scan - 1)
+            change = self._of_loop if scan in self._loops else self._of_steps[scan - 1]
+            to_scan = geometry.adjoint(geometry.inverse(self._poses[scan]) @ self._poses[earlier])
+            result[scan] = to_scan @ result[earlier] @ to_scan.T + np.diag(change)
+        return result

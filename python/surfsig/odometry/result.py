@@ -73,7 +73,7 @@ class Odometry:
     scan's own axes. NaN where the times of points are not known, and where there is no pose."""
     loops: list[LoopClosure]
     """Scans that the sensor came back with to where it was: what it had drifted by is distributed over the
-    way between. Covariances are those before, and so too large rather than too small."""
+    way between, whose covariances become smaller by as much as those of a random walk would."""
 
     def __len__(self) -> int:
         """Return the number of scans."""

@@ -221,7 +221,9 @@ class Tracker:
         voxel = np.nan if self._odometry.voxel is None else self._odometry.voxel
         if close_loops and loops:
             # Voxels are such that a scan fills some thousand: it sees some thirty of them far.
-            arrays["poses"] = closed(arrays["poses"], arrays["segments"], loops, _REACH * voxel)
+            arrays["poses"], arrays["covariances"] = closed(
+                arrays["poses"], arrays["covariances"], arrays["segments"], loops, _REACH * voxel
+            )
         return Odometry(
             **arrays,
             loops=loops,

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig import geometry
+from surfsig.alignment.pose_graph import Edge, Solution, solve
+from surfsig.alignment.spanning_tree import edges_between, spanning_poses
 from surfsig.point_cloud import PointCloud
-from surfsig.registration.pose_graph import Edge, Solution, edges_between, solve, spanning_poses
 from surfsig.registration.registration import Registration
 
 Array = NDArray[np.float64]
