@@ -92,3 +92,10 @@ def test_a_package_is_imported_as_a_module(package: ModuleType) -> None:
     parent, _, name = package.__name__.rpartition(".")
     assert inspect.ismodule(getattr(importlib.import_module(parent), name) if parent else package)
     assert all(hasattr(package, name) for name in getattr(package, "__all__", ()))
+
+
+def test_scipy_is_loaded_where_it_is_used_only() -> None:
+    """Its parts take longer to load than all of surfsig does, and most calls of the shell need none."""
+    code = "import sys, surfsig; print([name for name in sys.modules if name in ('scipy.spatial', 'scipy.stats')])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
