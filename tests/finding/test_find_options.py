@@ -3,6 +3,7 @@
 import csv
 import sqlite3
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from finding_scene import finding_scene, whole
 
 import surfsig
 from surfsig.cli import run
-from surfsig.files import ply
+from surfsig.files.ply_elements import element_blocks
 from surfsig.finding.library import stored_model
 from surfsig.finding.model_files import outer_surface
 
@@ -122,10 +123,10 @@ def test_a_cloud_stays_as_it_is_and_is_read_once(tmp_path: Path, monkeypatch: py
     header, end, values = (tmp_path / "ball.ply").read_bytes().partition(b"end_header\n")
     faces = b"element face 0\nproperty list uchar int vertex_indices\n"
     (tmp_path / "ball.ply").write_bytes(header + faces + end + values)
-    read_elements, blocks = [], ply.element_blocks
-    monkeypatch.setattr(ply, "element_blocks", lambda *some: read_elements.append(1) or blocks(*some))
+    blocks = mock.Mock(side_effect=element_blocks)
+    monkeypatch.setattr("surfsig.files.ply.element_blocks", blocks)
     assert len(surfsig.read_model(tmp_path / "ball.ply")) == 3000
-    assert len(read_elements) == 1
+    assert blocks.call_count == 1
     with pytest.raises(surfsig.InvalidInputError, match="no faces"):
         surfsig.read_model(tmp_path / "ball.ply", samples=100)
 

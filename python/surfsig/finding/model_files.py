@@ -34,7 +34,7 @@ _NORMALS = ("nx", "ny", "nz")
 
 
 def read_model(path: str | Path, *, samples: int | None = None, **reading: Any) -> PointCloud:
-    """Read a model for `find_instances` or a `Library`: a mesh becomes points of its outer surface.
+    r"""Read a model for `find_instances` or a `Library`: a mesh becomes points of its outer surface.
 
     Of a mesh, points are spread over the faces, and those are left out that no sensor sees from anywhere, as
     of parts inside; their normals are on the outer side. A cloud keeps its points.
@@ -67,7 +67,7 @@ def read_model(path: str | Path, *, samples: int | None = None, **reading: Any) 
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = Path(folder, "corner.obj")
     ...     lines = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "v 0 0 1", "f 1 3 2", "f 1 2 4", "f 1 4 3"]
-    ...     written = file.write_text("\\n".join([*lines, ""]))
+    ...     written = file.write_text("\n".join([*lines, ""]))
     ...     model = surfsig.read_model(file, samples=500)
     >>> sorted(model.fields)
     ['nx', 'ny', 'nz']
