@@ -45,7 +45,13 @@ def scan_of(
 
 @contextmanager
 def options(
-    c: CInterface, *, score: float = 0.0, threads: int = 1, stop: int = 0, steps: list[tuple[int, int]]
+    c: CInterface,
+    *,
+    score: float = 0.0,
+    at_most: int = 0,
+    threads: int = 1,
+    stop: int = 0,
+    steps: list[tuple[int, int]],
 ) -> Iterator[c_void_p]:
     """Make options whose progress goes into a list."""
     f = c.functions
@@ -58,6 +64,7 @@ def options(
     call = PROGRESS(told)
     try:
         c.check(f.surfsig_find_options_set_score(made, c_double(score)))
+        c.check(f.surfsig_find_options_set_at_most(made, c_size_t(at_most)))
         c.check(f.surfsig_find_options_set_threads(made, c_uint32(threads)))
         c.check(f.surfsig_find_options_set_progress(made, call, c_void_p()))
         yield made
@@ -89,13 +96,14 @@ def found_by_c(
     scan: Scan,
     *,
     score: float = 0.0,
+    at_most: int = 0,
     threads: int = 1,
     stop: int = 0,
 ) -> Found:
     """Find instances by the C interface."""
     f, made, found, steps = c.functions, c_void_p(1), [], list[tuple[int, int]]()
     pointers = (c_void_p * len(models))(*models)
-    with options(c, score=score, threads=threads, stop=stop, steps=steps) as how:
+    with options(c, score=score, at_most=at_most, threads=threads, stop=stop, steps=steps) as how:
         code = f.surfsig_find_instances(pointers, c_size_t(len(models)), byref(scan), how, byref(made))
         assert (code == 0) == bool(made)
         c.check(code)
@@ -111,7 +119,9 @@ def found_by_c(
     return found
 
 
-def check(found: Found, expected: surfsig.Instances, names: tuple[str, ...] = ("model",)) -> None:
+def check(
+    found: Found, expected: surfsig.Instances | list[surfsig.Instance], names: tuple[str, ...] = ("model",)
+) -> None:
     """All numbers are the same."""
     assert len(found) == len(expected) > 0
     for (ours, indices), theirs in zip(found, expected, strict=True):
@@ -167,6 +177,7 @@ def test_one_view_is_a_model_and_several_are_told_apart(c: CInterface, scene: Fi
         scan_of(c, scene.cloud.points, np.zeros(3)) as scan,
     ):
         check(found_by_c(c, [first, second], scan), expected, tuple(clouds))
+        check(found_by_c(c, [first, second], scan, at_most=1), [expected[0]], tuple(clouds))
         assert found_by_c(c, [], scan) == []
 
 

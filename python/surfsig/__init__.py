@@ -48,7 +48,15 @@ from surfsig.files import (
     write_covariances,
     write_trajectory,
 )
-from surfsig.finding import Instance, Instances, Library, LibraryEntry, find_instances
+from surfsig.finding import (
+    Instance,
+    Instances,
+    Library,
+    LibraryEntry,
+    find_instances,
+    read_model,
+    read_models,
+)
 from surfsig.flat_atom import flat_atom_length
 from surfsig.fusion import fuse_scans
 from surfsig.missing_returns import remove_missing_returns
@@ -191,6 +199,8 @@ __all__ = [
     "open",
     "open_scan_sequence",
     "read",
+    "read_model",
+    "read_models",
     "read_trajectory",
     "register",
     "register_multiway",

@@ -3,6 +3,7 @@
 import csv
 import sqlite3
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -10,8 +11,9 @@ from finding_scene import finding_scene, whole
 
 import surfsig
 from surfsig.cli import run
+from surfsig.files.ply_elements import element_blocks
 from surfsig.finding.library import stored_model
-from surfsig.finding.model_files import model_files, outer_surface, read_model
+from surfsig.finding.model_files import outer_surface
 
 
 @pytest.fixture(scope="module")
@@ -103,17 +105,30 @@ def test_a_folder_of_meshes_becomes_a_library(tmp_path: Path) -> None:
     points = surfsig.Library(library).get("one").points
     np.testing.assert_allclose(np.ptp(points, axis=0), [0.08, 0.05, 0.03], atol=2e-3)
     write_box(tmp_path / "one.stl.obj")
-    assert set(model_files([meshes / "one.obj", tmp_path / "one.stl.obj"])) == {"one", "one.stl"}
+    assert set(dict(surfsig.read_models([meshes / "one.obj", tmp_path / "one.stl.obj"]))) == {
+        "one",
+        "one.stl",
+    }
     with pytest.raises(surfsig.InvalidInputError, match="same name"):
-        model_files([meshes, meshes / "one.obj"])
+        surfsig.read_models([meshes, meshes / "one.obj"])
     (tmp_path / "empty").mkdir()
     with pytest.raises(surfsig.InvalidInputError, match="without models"):
-        model_files([tmp_path / "empty"])
+        surfsig.read_models([tmp_path / "empty"])
 
 
-def test_a_cloud_stays_as_it_is(tmp_path: Path) -> None:
+def test_a_cloud_stays_as_it_is_and_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     surfsig.write(tmp_path / "ball.pcd", ball(0.02))
-    assert len(read_model(tmp_path / "ball.pcd")) == 3000
+    assert len(surfsig.read_model(tmp_path / "ball.pcd")) == 3000
+    surfsig.write(tmp_path / "ball.ply", ball(0.02))
+    header, end, values = (tmp_path / "ball.ply").read_bytes().partition(b"end_header\n")
+    faces = b"element face 0\nproperty list uchar int vertex_indices\n"
+    (tmp_path / "ball.ply").write_bytes(header + faces + end + values)
+    blocks = mock.Mock(side_effect=element_blocks)
+    monkeypatch.setattr("surfsig.files.ply.element_blocks", blocks)
+    assert len(surfsig.read_model(tmp_path / "ball.ply")) == 3000
+    assert blocks.call_count == 1
+    with pytest.raises(surfsig.InvalidInputError, match="no faces"):
+        surfsig.read_model(tmp_path / "ball.ply", samples=100)
 
 
 def test_a_model_of_an_older_library_is_prepared_again(tmp_path: Path) -> None:

@@ -852,6 +852,14 @@ void surfsig_find_options_free(surfsig_find_options *options);
 surfsig_code surfsig_find_options_set_score(surfsig_find_options *options, double score);
 
 /**
+ * Chooses how many instances of all models are given at most: the most probable ones.
+ *
+ * @param options The options to change.
+ * @param at_most How many; 0 for all.
+ */
+surfsig_code surfsig_find_options_set_at_most(surfsig_find_options *options, size_t at_most);
+
+/**
  * Chooses the number of threads. The result is the same, bit for bit.
  *
  * @param options The options to change.

@@ -14,6 +14,9 @@ namespace surfsig {
 class FindOptions {
 public:
   FindOptions &score(double score) { return checked(surfsig_find_options_set_score(handle_.get(), score)); }
+  FindOptions &at_most(std::size_t count) {
+    return checked(surfsig_find_options_set_at_most(handle_.get(), count));
+  }
   FindOptions &threads(std::uint32_t threads) {
     return checked(surfsig_find_options_set_threads(handle_.get(), threads));
   }

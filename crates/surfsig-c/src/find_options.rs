@@ -44,6 +44,21 @@ pub extern "C" fn surfsig_find_options_set_score(
     })
 }
 
+/// Chooses how many instances of all models are given at most: the most probable ones.
+///
+/// @param options The options to change.
+/// @param at_most How many; 0 for all.
+#[unsafe(no_mangle)]
+pub extern "C" fn surfsig_find_options_set_at_most(
+    options: Option<&mut surfsig_find_options>,
+    at_most: usize,
+) -> surfsig_code {
+    set(options, |options| {
+        options.settings.at_most = if at_most == 0 { FindSettings::default().at_most } else { at_most };
+        Ok(())
+    })
+}
+
 /// Chooses the number of threads. The result is the same, bit for bit.
 ///
 /// @param options The options to change.

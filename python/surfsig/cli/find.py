@@ -85,7 +85,6 @@ def find_command(
       surfsig find cup.obj depth.png --intrinsics 575,575,320,240 --bop poses.csv
     """  # noqa: D301
     import surfsig
-    from surfsig.finding.model_files import read_model
 
     if len(files) != (2 if library is None else 1):
         wanted = "MODEL and SCENE" if library is None else "SCENE alone, beside --library"
@@ -94,7 +93,7 @@ def find_command(
     on_stdout = check_results(output, json_file, report, bop)
     model: surfsig.Library | dict[str, surfsig.PointCloud]
     if library is None:
-        model = {files[0].stem: read_model(files[0], **_of_model(files[0], reading))}
+        model = {files[0].stem: surfsig.read_model(files[0], **_of_model(files[0], reading))}
     else:
         if not library.exists():
             raise surfsig.InvalidInputError(f"{library}: no such file")

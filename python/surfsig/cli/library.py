@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,22 +43,21 @@ def add_command(
     Points are spread over the outer surface of a mesh.
     """
     import surfsig
-    from surfsig.finding.model_files import model_files, read_model
 
     store = surfsig.Library(library)
+    found: Iterable[tuple[str, surfsig.PointCloud]]
     if len(models) == 2 and not Path(models[0]).exists():
-        found = {models[0]: Path(models[1])}
+        found = [(models[0], surfsig.read_model(models[1], **reading))]
     else:
-        found = model_files(map(Path, models))
+        found = surfsig.read_models(models, **reading)
     unit = "m" if reading.get("unit") else None
-    for name, file in found.items():
-        cloud = read_model(file, **reading)
+    for name, cloud in found:
         try:
             entry = store.add(name, cloud, unit=unit, replace=replace, threads=threads)
         except surfsig.InvalidInputError as error:
             text = str(error)
             raise surfsig.InvalidInputError(
-                text if text.startswith(str(library)) else f"{file}: {text}"
+                text if text.startswith(str(library)) else f"{name}: {text}"
             ) from None
         click.echo(f"{library}: added {entry.name}, {entry.points:,} points")
 

@@ -41,7 +41,7 @@ class Faces:
             If there are none.
         """
         for position, element in enumerate(elements):
-            if position == vertex or element.name.lower() == "tristrips":
+            if position == vertex or element.count == 0 or element.name.lower() == "tristrips":
                 continue
             places = [i for i, item in enumerate(element.properties) if item.length]
             named = [i for i in places if element.properties[i].name.lower() in _CORNERS]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -33,14 +33,95 @@ _ONE_SIDE = 0.5
 _NORMALS = ("nx", "ny", "nz")
 
 
-def model_files(paths: Iterable[Path]) -> dict[str, Path]:
-    """Name the models in files and folders: each by its file's name without ending.
+def read_model(path: str | Path, *, samples: int | None = None, **reading: Any) -> PointCloud:
+    r"""Read a model for `find_instances` or a `Library`: a mesh becomes points of its outer surface.
+
+    Of a mesh, points are spread over the faces, and those are left out that no sensor sees from anywhere, as
+    of parts inside; their normals are on the outer side. A cloud keeps its points.
+
+    Parameters
+    ----------
+    path
+        The file, as `surfsig.read` takes it.
+    samples
+        Points that are spread over a mesh; 20,000 by default, 2 mm apart on an object of 150 mm. Then a cloud
+        is refused.
+    **reading
+        Other options of `surfsig.read`, such as `unit`.
+
+    Returns
+    -------
+    PointCloud
+        With the fields nx, ny and nz of a mesh.
+
+    Raises
+    ------
+    OSError, FileFormatError, InvalidInputError
+        As `surfsig.read`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import surfsig
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder, "corner.obj")
+    ...     lines = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "v 0 0 1", "f 1 3 2", "f 1 2 4", "f 1 4 3"]
+    ...     written = file.write_text("\n".join([*lines, ""]))
+    ...     model = surfsig.read_model(file, samples=500)
+    >>> sorted(model.fields)
+    ['nx', 'ny', 'nz']
+    """
+    if samples is not None:
+        return outer_surface(read(path, samples=samples, **reading))
+    try:
+        mesh = read(path, samples=SURFACE_SAMPLES, **reading)
+    except InvalidInputError:
+        # It is no mesh, or one without faces.
+        return read(path, **reading)
+    return outer_surface(mesh)
+
+
+def read_models(paths: Iterable[str | Path], **reading: Any) -> Iterator[tuple[str, PointCloud]]:
+    """Read the models of files and folders one after the other, each named by its file without the ending.
+
+    Parameters
+    ----------
+    paths
+        Files, and folders, of which each file of a kind that can be a model is one.
+    **reading
+        Options of `read_model`.
+
+    Yields
+    ------
+    name, cloud
+        The model's name, and its cloud as `read_model` gives it; those of a folder in the order of their
+        names.
 
     Raises
     ------
     InvalidInputError
-        If a folder has no model, or two files have one name.
+        If a folder has no model, or two files have one name; before any is read.
+    OSError, FileFormatError
+        As `surfsig.read`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> import surfsig
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     surfsig.write(Path(folder, "cup.ply"), np.random.default_rng(0).normal(size=(100, 3)))
+    ...     models = dict(surfsig.read_models([folder]))
+    >>> list(models)
+    ['cup']
     """
+    files = _model_files(map(Path, paths))
+    return ((name, read_model(file, **reading)) for name, file in files.items())
+
+
+def _model_files(paths: Iterable[Path]) -> dict[str, Path]:
     found: dict[str, Path] = {}
     for path in paths:
         files = [path]
@@ -53,17 +134,6 @@ def model_files(paths: Iterable[Path]) -> dict[str, Path]:
                 raise InvalidInputError(f"{file}: has the same name as {found[file.stem]}")
             found[file.stem] = file
     return found
-
-
-def read_model(path: Path, **reading: Any) -> PointCloud:
-    """Read a model: of a mesh, points spread over what can be seen of its surface; of a cloud, its points."""
-    if reading.get("samples") is None:
-        try:
-            return outer_surface(read(path, **{**reading, "samples": SURFACE_SAMPLES}))
-        except InvalidInputError:
-            # It is no mesh, or one without faces.
-            return read(path, **reading)
-    return outer_surface(read(path, **reading))
 
 
 def outer_surface(cloud: PointCloud) -> PointCloud:

@@ -5,6 +5,7 @@ use std::mem::MaybeUninit;
 
 pub fn options(called: &mut Called) {
     call!(called, surfsig_find_options_set_score(None, 0.5) gives INVALID);
+    call!(called, surfsig_find_options_set_at_most(None, 1) gives INVALID);
     call!(called, surfsig_find_options_set_threads(None, 1) gives INVALID);
     call!(called, surfsig_find_options_set_progress(None, Some(stop), null_mut()) gives INVALID);
     call!(called, surfsig_find_options_free(None));
@@ -13,6 +14,9 @@ pub fn options(called: &mut Called) {
         call!(called, surfsig_find_options_set_score(Some(&mut options), score) gives INVALID);
     }
     call!(called, surfsig_find_options_set_threads(Some(&mut options), 1025) gives INVALID);
+    for at_most in [1, usize::MAX, 0] {
+        call!(called, surfsig_find_options_set_at_most(Some(&mut options), at_most) gives OK);
+    }
     call!(called, surfsig_find_options_set_score(Some(&mut options), 0.0) gives OK);
     call!(called, surfsig_find_options_set_score(Some(&mut options), 1.0) gives OK);
     call!(called, surfsig_find_options_free(Some(options)));
