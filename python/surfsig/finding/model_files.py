@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from surfsig import _surfsig
 from surfsig.errors import InvalidInputError
@@ -147,7 +147,11 @@ def outer_surface(cloud: PointCloud) -> PointCloud:
     if len(finite) == 0:
         return finite
     points = np.ascontiguousarray(finite.points - finite.points.mean(axis=0), np.float64)
-    distances = cKDTree(points).query(points, k=[_NEIGHBOURS + 1])[0] if len(points) > _NEIGHBOURS else [0.0]
+    distances = (
+        scipy.spatial.cKDTree(points).query(points, k=[_NEIGHBOURS + 1])[0]
+        if len(points) > _NEIGHBOURS
+        else [0.0]
+    )
     spacing = float(np.quantile(distances, _WIDEST))
     if spacing == 0.0:
         return finite
