@@ -54,7 +54,7 @@ def sections(function: Function) -> dict[str, list[str]]:
 def documented(lines: list[str]) -> set[str]:
     """Give the names that a section of parameters or attributes explains."""
     heads = [line.partition(" : ")[0] for line in lines if line and not line[0].isspace()]
-    return {name.strip() for head in heads for name in head.split(",")}
+    return {name.strip(" *") for head in heads for name in head.split(",")}
 
 
 def raises(function: Function) -> bool:

@@ -117,13 +117,6 @@ impl<const N: usize> KdTree<N> {
         std::mem::replace(&mut self.indices, leaves.collect())
     }
 
-    /// Moves all points by the same.
-    pub(crate) fn translate(&mut self, by: [f64; N]) {
-        self.points.iter_mut().for_each(|point| point.iter_mut().zip(by).for_each(|(c, by)| *c += by));
-        // A split is at a coordinate of a point, and stays there.
-        self.splits.iter_mut().for_each(|split| split.value += by[usize::from(split.axis)]);
-    }
-
     /// The points in the order of the leaves.
     pub(crate) fn points(&self) -> &[[f64; N]] {
         &self.points
@@ -372,13 +365,6 @@ mod tests {
                 tree.nearest_k(at, count, &mut found);
                 prop_assert_eq!(&found, &expected[..count.min(expected.len())]);
             }
-            // In halves and whole numbers nothing is rounded.
-            let by = [3.5, -7.0, 100.0];
-            let mut moved = tree.clone();
-            moved.translate(by);
-            let at = at.map(|c| (2.0 * c).round() / 2.0);
-            moved.nearest_k([0, 1, 2].map(|k| at[k] + by[k]), 7, &mut found);
-            prop_assert_eq!(&found, &slow(&points, at)[..points.len().min(7)]);
         }
     }
 

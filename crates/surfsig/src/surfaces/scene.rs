@@ -63,8 +63,6 @@ const VOXELS: f64 = 4.0;
 /// Finite points about their middle, with what is known about each.
 pub(super) struct Scene {
     pub points: Vec<Vector>,
-    /// The chosen points, by their places in `chosen`.
-    tree: KdTree,
     /// Numbers of these points in the cloud.
     pub numbers: Vec<u32>,
     pub origin: Vector,
@@ -102,15 +100,14 @@ impl Scene {
         is_exact: Option<bool>,
         monitor: &Monitor,
     ) -> Result<Option<Self>, Error> {
-        let (mut tree, numbers, origin) = sorted(cloud)?;
-        let points: Vec<Vector> = tree.points().iter().map(|p| Vector::from(*p)).collect();
-        let Some(mut around) = Surroundings::new(&tree, tree.points(), neighbours, monitor)? else {
+        let (tree, numbers) = sorted(cloud)?;
+        let positions = tree.points();
+        let Some(mut around) = Surroundings::new(&tree, positions, neighbours, monitor)? else {
             return Ok(None);
         };
-        let mut chosen: Vec<u32> = (0..points.len() as u32).collect();
+        let mut chosen: Vec<u32> = (0..positions.len() as u32).collect();
         if around.typical > CLUMPED * around.spacing {
             let edge = around.typical / VOXELS;
-            let positions = tree.points();
             chosen = voxel_representatives(&PointCloud::new_f64(positions), Radius::new(edge)?)?;
             let places: Vec<[f64; 3]> = chosen.iter().map(|&i| positions[i as usize]).collect();
             let of_chosen = KdTree::new(&places);
@@ -119,9 +116,12 @@ impl Scene {
             };
             around = thinned;
             around.graph = around.graph.with_left_out(positions, &chosen, edge);
-            tree = of_chosen;
         }
         let Surroundings { fits, graph, typical, spacing, is_even } = around;
+        let count = positions.len() as f64;
+        let origin = positions.iter().map(|p| Vector::from(*p)).sum::<Vector>() / count;
+        let points: Vec<Vector> = positions.iter().map(|p| Vector::from(*p) - origin).collect();
+        drop(tree);
         let mut scene = Self {
             known: noise,
             is_exact: false,
@@ -131,7 +131,6 @@ impl Scene {
             normals: vec![Vector::repeat(f64::NAN); points.len()],
             labels: vec![NONE; points.len()],
             points,
-            tree,
             numbers,
             origin,
             graph,
@@ -182,7 +181,7 @@ impl Scene {
         let places: Vec<[f64; 3]> = self.chosen.iter().map(|&i| self.points[i as usize].into()).collect();
         let rank = |point: &u32| self.chosen.partition_point(|chosen| chosen < point) as u32;
         let some_ranks: Vec<u32> = some.iter().map(rank).collect();
-        let fits = fits_at(&self.tree, &places, &some_ranks, neighbours, monitor)?;
+        let fits = fits_at(&places, &some_ranks, neighbours, monitor)?;
         self.learn(&fits, some);
         Ok(())
     }
@@ -365,9 +364,9 @@ impl Scene {
     }
 }
 
-/// A cloud's finite points about their middle, in the order of a tree's leaves, so that points near each other are near in
-/// memory; their numbers in the cloud, and the middle.
-fn sorted(cloud: &PointCloud<'_>) -> Result<(KdTree, Vec<u32>, Vector), Error> {
+/// A cloud's finite points in the order of a tree's leaves, so that points near each other are near in memory, and their
+/// numbers in the cloud.
+fn sorted(cloud: &PointCloud<'_>) -> Result<(KdTree, Vec<u32>), Error> {
     if u32::try_from(cloud.len()).is_err() {
         return Err(Error::TooManyPoints(cloud.len()));
     }
@@ -376,8 +375,5 @@ fn sorted(cloud: &PointCloud<'_>) -> Result<(KdTree, Vec<u32>, Vector), Error> {
     let positions: Vec<[f64; 3]> = finite.iter().filter_map(|&i| cloud.position(i as usize)).collect();
     let mut tree = KdTree::new(&positions);
     let numbers = tree.renumber().into_iter().map(|i| finite[i as usize]).collect();
-    let count = positions.len().max(1) as f64;
-    let origin = tree.points().iter().map(|p| Vector::from(*p)).sum::<Vector>() / count;
-    tree.translate((-origin).into());
-    Ok((tree, numbers, origin))
+    Ok((tree, numbers))
 }

@@ -64,9 +64,8 @@ impl Surroundings {
     }
 }
 
-/// Surfaces through so many nearest points of some of a tree's points, ascending.
+/// Surfaces through so many nearest points of some points, ascending.
 pub(super) fn fits_at(
-    tree: &KdTree,
     positions: &[[f64; 3]],
     some: &[u32],
     neighbours: usize,
@@ -75,10 +74,11 @@ pub(super) fn fits_at(
     if some.is_empty() {
         return Ok(Vec::new());
     }
+    let tree = KdTree::new(positions);
     let mut is_asked = vec![false; positions.len()];
     some.iter().for_each(|&point| is_asked[point as usize] = true);
     let is_asked = |point: u32| is_asked[point as usize];
-    let found = fit_nearest(tree, positions, &is_asked, neighbours, 0, &|_, _| (), monitor)?;
+    let found = fit_nearest(&tree, positions, &is_asked, neighbours, 0, &|_, _| (), monitor)?;
     let mut fits = vec![LocalFit::MISSING; some.len()];
     for FitAt { point, fit, .. } in found.into_iter().flatten() {
         fits[some.partition_point(|&other| other < point)] = fit;
