@@ -23,7 +23,7 @@ _UNDETERMINED = 1e-9
 """Of the largest eigenvalue of the normal matrix of all poses, below which no edge says anything."""
 _NO_PART = 0.0025
 """Part of such a motion that a component of a scan's twist has, squared, below which it has none."""
-ROBUST = 3.0
+_ROBUST = 3.0
 """Standard deviations beyond which a residual counts less than its square (`soft_l1` of SciPy)."""
 _ITERATIONS = 200
 """Steps, at most: right edges need three to five, and one that is far off some tens."""
@@ -154,9 +154,8 @@ class PoseGraph:
     def _solved(self, normal: scipy.sparse.csc_matrix, damping: float, gradient: Array) -> Array:
         diagonal = normal.diagonal()
         added = damping * diagonal + _LEAST_DIAGONAL * max(float(diagonal.max()), np.finfo(float).tiny)
-        return np.asarray(
-            -scipy.sparse.linalg.splu((normal + scipy.sparse.diags(added)).tocsc()).solve(gradient)
-        )
+        damped = (normal + scipy.sparse.diags(added)).tocsc()
+        return np.asarray(-scipy.sparse.linalg.splu(damped).solve(gradient))
 
     def _moved(self, poses: Array, step: Array) -> Array:
         """Give poses after a step: twists of all but the first in their own axes, rotations as lengths."""
@@ -272,7 +271,7 @@ def solve(count: int, first: int, edges: Sequence[Edge]) -> Solution:
         np.array([edge.information for edge in joined]),
         np.array([edge.center for edge in joined]),
         first=int(number[first]),
-        robust=ROBUST,
+        robust=_ROBUST,
     )
     poses[nodes] = graph.fit(poses[nodes])
     residuals[used] = np.sqrt((graph.residuals(poses[nodes]) ** 2).mean(axis=1))

@@ -74,6 +74,11 @@ class ScanSequence:
             warnings.warn(f"{error}; its scans end there", stacklevel=2)
 
 
+def clock_time(timestamp: float, number: int) -> float | None:
+    """Give the time of a scan, or None where it is the scan's number: that is no clock."""
+    return None if timestamp == number else timestamp
+
+
 Scans = (
     str
     | os.PathLike[str]

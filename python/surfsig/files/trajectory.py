@@ -93,12 +93,12 @@ def write_trajectory(
     else:
         known = np.isfinite(matrices).all(axis=(1, 2))
         kept = matrices[known]
-        turns = (
+        quaternions = (
             scipy.spatial.transform.Rotation.from_matrix(kept[:, :3, :3]).as_quat()
             if len(kept)
             else np.zeros((0, 4))
         )
-        rows = np.column_stack([times[known], kept[:, :3, 3], turns])
+        rows = np.column_stack([times[known], kept[:, :3, 3], quaternions])
     _write_rows(path, rows)
 
 

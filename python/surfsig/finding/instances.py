@@ -236,7 +236,7 @@ class Instances:
         Returns
         -------
         The names of the columns, and a row for each: its number, the model's name, score, visible share,
-        where the model's origin is, its turn as a rotation vector in degrees, rms, points, free directions.
+        where the model's origin is, its rotation as a vector in degrees, rms, points, free directions.
         """
         header = (
             "",
@@ -251,9 +251,7 @@ class Instances:
         )
         rows: list[tuple[str, ...]] = []
         for number, instance in enumerate(self.instances):
-            turn = scipy.spatial.transform.Rotation.from_matrix(instance.T_scene_model[:3, :3]).as_rotvec(
-                degrees=True
-            )
+            rotation = scipy.spatial.transform.Rotation.from_matrix(instance.T_scene_model[:3, :3])
             rows.append(
                 (
                     f"{number}",
@@ -261,7 +259,7 @@ class Instances:
                     f"{instance.score:.2f}",
                     f"{instance.visible:.0%}",
                     _with_digits(instance),
-                    " ".join(f"{value:.1f}" for value in turn),
+                    " ".join(f"{value:.1f}" for value in rotation.as_rotvec(degrees=True)),
                     f"{instance.rms:.2g}",
                     f"{len(instance.indices)}",
                     "; ".join(map(str, instance.free_directions)) or "none",

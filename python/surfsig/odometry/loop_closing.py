@@ -82,16 +82,16 @@ class _Chain:
         for loop in loops:
             arrived[number[loop.scan]] = loop.T_world_scan_before
         self._loops = {number[loop.scan]: number[loop.earlier] for loop in loops}
-        self._steps = geometry.inverse(poses[:-1]) @ arrived[1:]
-        # A random walk: the variance of a step is as its length, and a loop counts as one step of the usual
-        # length does. Rotations count by how far they move what is seen.
-        moved = geometry.log_pose(self._steps)
+        steps = geometry.inverse(poses[:-1]) @ arrived[1:]
+        # A random walk: the variance of a step is as its length, and that of a loop the median of the steps'.
+        # Rotations count by how far they move what is seen.
+        moved = geometry.log_pose(steps)
         length = np.linalg.norm(moved[:, 3:], axis=1) + reach * np.linalg.norm(moved[:, :3], axis=1)
         variance = length + _STANDING * reach
         unit = np.array([1.0 / reach] * 3 + [1.0] * 3) ** 2
         self._of_steps = variance[:, None] * unit
         self._of_loop = float(np.median(variance)) * unit
-        measured = np.concatenate([self._steps, [loop.T_earlier_scan for loop in loops]])
+        measured = np.concatenate([steps, [loop.T_earlier_scan for loop in loops]])
         of_edges = np.concatenate([self._of_steps, np.tile(self._of_loop, (len(loops), 1))])
         self._graph = PoseGraph(
             np.concatenate([np.arange(1, count), [number[loop.scan] for loop in loops]]),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.arguments import positive_length
 from surfsig.errors import InvalidInputError
-from surfsig.files.sequence import Scans, timed_scans
+from surfsig.files.sequence import Scans, clock_time, timed_scans
 from surfsig.fusion import fuse_scans
 from surfsig.odometry.loop_closing import LoopClosure
 from surfsig.odometry.point_times import deskew
@@ -185,8 +185,7 @@ class Odometry:
         for number, scan in enumerate(timed_scans(scans)):
             if number == len(self):
                 raise InvalidInputError(f"there are {len(self)} poses, but more scans")
-            # Numbers in place of times are no clock.
-            timestamp = None if self.timestamps[number] == number else float(self.timestamps[number])
+            timestamp = clock_time(float(self.timestamps[number]), number)
             yield deskew(scan.cloud, self.twists[number], timestamp=timestamp, spin_rate=spin_rate)
         if number + 1 != len(self):
             raise InvalidInputError(f"there are {len(self)} poses, but {number + 1} scans")

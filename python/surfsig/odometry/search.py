@@ -9,7 +9,7 @@ from collections.abc import Callable, Sized
 from surfsig._surfsig import OdometrySettings
 from surfsig.arguments import progress_callback
 from surfsig.errors import InvalidInputError
-from surfsig.files.sequence import Scans, open_scan_sequence, timed_scans
+from surfsig.files.sequence import Scans, clock_time, open_scan_sequence, timed_scans
 from surfsig.odometry.result import Odometry
 from surfsig.odometry.tracker import Tracker
 
@@ -101,9 +101,7 @@ def estimate_odometry(
         scans = open_scan_sequence(scans)
     total = len(scans) if isinstance(scans, Sized) else None
     for number, scan in enumerate(timed_scans(scans)):
-        # Numbers in place of times are no clock.
-        timestamp = None if scan.timestamp == number else scan.timestamp
-        tracker.push(scan.cloud, timestamp=timestamp)
+        tracker.push(scan.cloud, timestamp=clock_time(scan.timestamp, number))
         if tell is not None:
             tell(number + 1, number + 1 if total is None else total)
     if not len(tracker):

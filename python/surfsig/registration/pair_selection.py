@@ -59,6 +59,8 @@ class PairSelection:
         self._found = found
         self._free_space = free_space
         self._doubted_share = doubted_share
+        # What a pose may move a scan's points by before free space is measured again.
+        self._same = _SAME * agree * min((result.radius for *_, result in found), default=0.0)
         # Of each source and target the pose at which free space was measured last, and its share.
         self._measured: dict[tuple[int, int], tuple[Array, float]] = {}
         rng = np.random.default_rng(1)
@@ -150,8 +152,7 @@ class PairSelection:
     def _share(self, source: int, target: int, pose: Array) -> float:
         """Give the share of points in free space at a pose, or at one that is nearly the same."""
         last = self._measured.get((source, target))
-        radius = min(result.radius for *_, result in self._found)
-        if last is None or self._apart(source, pose, last[0]) > _SAME * self._agree * radius:
+        if last is None or self._apart(source, pose, last[0]) > self._same:
             last = pose, self._free_space(source, target, pose)
             self._measured[source, target] = last
         return last[1]
