@@ -41,6 +41,7 @@ Imports for type checkers only do not count."""
 
 PYTHON_EXCEPTIONS = {
     ("point_cloud", "convert"): "PointCloud.of takes the objects of other libraries, imported when they come",
+    ("point_cloud", "page"): "a notebook shows a cloud as a page, imported when it does",
     ("files", "convert"): "convert.libraries, which names a library that is missing, should lie lower",
 }
 

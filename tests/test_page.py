@@ -1,5 +1,6 @@
 """Pages with data inside: what they hold, and that they need no network."""
 
+import html
 import http.client
 import json
 import re
@@ -215,6 +216,29 @@ def test_a_cloud_is_served_to_who_knows_the_address_only() -> None:
     finally:
         server.shutdown()
         server.server_close()
+
+
+def test_a_notebook_shows_a_cloud_with_its_colours_normals_and_fields() -> None:
+    points = RNG.uniform(size=(50, 3))
+    fields = {
+        "red": np.arange(50, dtype=np.uint16) << 8,
+        "green": np.full(50, 0.5, np.float32),
+        "blue": np.arange(50, dtype=np.uint8),
+        **dict.fromkeys(("nx", "ny"), np.zeros(50)),
+        "nz": np.ones(50),
+        "intensity": np.linspace(0.0, 1.0, 50),
+        "descriptor": np.zeros((50, 4)),
+    }
+    frame = surfsig.PointCloud(points, fields=fields)._repr_html_()
+    assert frame.startswith('<iframe title="Cloud"')
+    (layer,) = report_of(html.unescape(frame.split('srcdoc="', 1)[1].rsplit('"', 1)[0]))["layers"]
+    assert same_points(layer["points"], points)
+    order = np.argsort(layer["colours"][:, 0])
+    np.testing.assert_array_equal(layer["colours"][order], [[k, 127, k] for k in range(50)])
+    np.testing.assert_allclose(layer["columns"]["intensity"][order], fields["intensity"], atol=1e-3)
+    assert list(layer["columns"]) == ["intensity"]
+    assert layer["normals"] is not None
+    assert surfsig.PointCloud(points)._repr_html_().startswith("<iframe")
 
 
 def test_show_gives_the_address_of_a_page() -> None:

@@ -258,6 +258,12 @@ class PointCloud:
 
         return table(self)
 
+    def _repr_html_(self) -> str:
+        """Show the cloud in a notebook, with at most 100,000 points."""
+        from surfsig.page import cloud_html
+
+        return cloud_html(self)
+
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """Give `points` to NumPy: ``numpy.asarray(cloud)``."""
         points = self.points

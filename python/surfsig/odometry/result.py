@@ -18,7 +18,7 @@ from surfsig.fusion import fuse_scans
 from surfsig.odometry.loop_closing import LoopClosure
 from surfsig.odometry.point_times import deskew
 from surfsig.odometry.report import report_html
-from surfsig.page import write_page
+from surfsig.page import notebook_html, write_page
 from surfsig.point_cloud import PointCloud
 
 Array = NDArray[np.float64]
@@ -108,6 +108,10 @@ class Odometry:
         The document, which needs no network.
         """
         return report_html(self, None, title)
+
+    def _repr_html_(self) -> str:
+        """Show the page in a notebook."""
+        return notebook_html(self.to_html(), "Odometry")
 
     def write_report(
         self, path: str | Path, scans: Iterable[PointCloud] | None = None, *, title: str = "Odometry"

@@ -6,7 +6,7 @@ It needs no network.
 
 from surfsig.page.document import page_html, write_page
 from surfsig.page.layer import Layer, Stage, Trajectory
-from surfsig.page.notebook import NOTEBOOK_POINTS, notebook_html
+from surfsig.page.notebook import NOTEBOOK_POINTS, cloud_html, notebook_html
 from surfsig.page.serve import serve_cloud
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "Layer",
     "Stage",
     "Trajectory",
+    "cloud_html",
     "notebook_html",
     "page_html",
     "serve_cloud",
