@@ -736,7 +736,7 @@ class OdometrySettings:
         plane_steps: int | None = None,
         max_point_distance: float | None = None,
         max_residual: float | None = None,
-        rival_radius: float | None = None,
+        held_share: float | None = None,
         map_range_factor: float | None = None,
         map_min_translation: float | None = None,
         map_min_rotation: float | None = None,
@@ -770,8 +770,9 @@ class OdometrySettings:
     def max_residual(self) -> float:
         """Largest point-to-plane residual of an inlier, in voxels."""
     @property
-    def rival_radius(self) -> float:
-        """Twice the length, in voxels, by which a scan is pushed along motions that are weakly determined."""
+    def held_share(self) -> float:
+        """Share of what the map's normals say about a weak motion that both halves of their neighbourhoods say alike,
+        from which on the surface holds it."""
     @property
     def map_range_factor(self) -> float:
         """Range of the map over the distance within which 99 in 100 points of a scan are."""

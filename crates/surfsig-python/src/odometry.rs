@@ -26,8 +26,9 @@ settings_class! {
         max_point_distance: f64 = alignment.max_point_distance,
         /// Largest point-to-plane residual of an inlier, in voxels.
         max_residual: f64 = alignment.max_residual,
-        /// Twice the length, in voxels, by which a scan is pushed along motions that are weakly determined.
-        rival_radius: f64 = alignment.rival_radius,
+        /// Share of what the map's normals say about a weak motion that both halves of their neighbourhoods say alike,
+        /// from which on the surface holds it.
+        held_share: f64 = alignment.held_share,
         /// Range of the map over the distance within which 99 in 100 points of a scan are.
         map_range_factor: f64 = map.range_factor,
         /// Translation, in voxels, from which on the next scan goes into the map.

@@ -29,7 +29,6 @@ pub use consensus::ConsensusSettings;
 pub(crate) use consensus::Correspondences;
 pub use doubt::Doubt;
 pub(crate) use even_sample::even_sample;
-pub(crate) use explained::Closeness;
 pub(crate) use faces::{FaceOffsets, FacedPoints, face_transforms};
 pub(crate) use gicp::gicp_with;
 pub use gicp::{GicpResult, GicpSettings, gicp};
@@ -38,12 +37,13 @@ pub(crate) use gicp_cloud::{GicpTarget, plane_of};
 pub(crate) use halves::{halves, systematic_covariance};
 pub(crate) use least_squares::{LinearisedDistances, solve_determined};
 pub use observability::{FreeDirection, free_directions};
+pub(crate) use observability::{Motions, UNOBSERVABLE};
 pub(crate) use open_covariance::{
     infinite_along, information_without, lengths, motions_beyond, orthonormal, unscaled,
 };
 pub(crate) use point_to_plane::{FACING_AWAY, OrientedSurface, cosine_towards, transformed};
 pub use point_to_surface::PointToSurfaceSettings;
-pub(crate) use point_to_surface::{PointToSurface, SURROUNDING, TargetSurface, surface_goes_on};
+pub(crate) use point_to_surface::{PointToSurface, TargetSurface};
 pub use rivals::{Alternative, RivalSettings};
-pub(crate) use rivals::{FittedSurface, FittedTarget, Rivals, ScaleLimits};
+pub(crate) use rivals::{FittedTarget, Rivals, ScaleLimits};
 pub(crate) use symmetry::symmetries;

@@ -123,6 +123,13 @@ impl Motions {
         named(&motions, self.center, self.unit)
     }
 
+    /// Of a point along a motion, of which a root mean square of 1 is unit.
+    pub fn velocity(&self, number: usize, point: &[f64; 3]) -> Vector3<f64> {
+        let motion = &self.all[number].1;
+        let rotation = motion.fixed_rows::<3>(0) / self.unit;
+        motion.fixed_rows::<3>(3) + rotation.cross(&(Vector3::from(*point) - self.center))
+    }
+
     /// The transform that carries points so far along a motion, in the root mean square.
     pub fn along(&self, number: usize, length: f64) -> RigidTransform {
         let [x, y, z, translation @ ..] = <[f64; 6]>::from(self.all[number].1 * length);

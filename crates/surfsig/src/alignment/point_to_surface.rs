@@ -12,7 +12,7 @@ use rayon::prelude::*;
 /// Nearest points of the target that its surface is fitted to.
 const NEIGHBORS: usize = 20;
 /// Nearest points that show whether the surface through the first ones goes on around them.
-pub(crate) const SURROUNDING: usize = 60;
+const SURROUNDING: usize = 60;
 /// Largest sine of the angle between the surface and points around it that it passes through.
 const LARGEST_SLOPE: f64 = 0.5;
 /// Share of the points around that it must pass through.
@@ -274,7 +274,7 @@ impl TargetSurface {
 }
 
 /// Whether the plane through the nearest points, which come first, passes through the others, too.
-pub(crate) fn surface_goes_on(points: &[Vector3<f64>]) -> bool {
+fn surface_goes_on(points: &[Vector3<f64>]) -> bool {
     if points.len() <= NEIGHBORS {
         return true;
     }

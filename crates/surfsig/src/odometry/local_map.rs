@@ -3,13 +3,11 @@
 use super::settings::MapSettings;
 use super::voxel_index::{Nearest, VoxelIndex, squared_distance};
 use crate::RigidTransform;
-use crate::alignment::{GicpTarget, SURROUNDING, plane_of, surface_goes_on};
+use crate::alignment::{GicpTarget, plane_of};
 use crate::visibility::{SphericalRangeImage, Visibility};
-use nalgebra::Vector3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
 
 /// Distance up to which a point's neighbourhood counts as dense: those that change one are then found in the blocks
 /// next to them.
@@ -18,6 +16,8 @@ const DENSE: f64 = 4.0;
 const CELL: f64 = 16.0;
 /// Points that one thread takes at a time.
 const PART: usize = 1024;
+/// Thickness of half of a neighbourhood above which its points may lie on one line, which has no normal.
+const MAX_HALF_THICKNESS: f64 = 0.7;
 
 /// One point for each voxel, the first that was seen, with the normal of the surface there.
 ///
@@ -34,8 +34,6 @@ pub(super) struct LocalMap {
     scans: Vec<u32>,
     /// Squared distance to the farthest neighbour that the normal was taken from; infinite where these were too few.
     reaches: Vec<f64>,
-    /// Of the points that were asked for, whether the surface around them goes on.
-    goes_on: Vec<OnceLock<bool>>,
     /// Scans in a row that have looked through each point.
     seen_through: Vec<u8>,
     scans_through: u8,
@@ -53,7 +51,6 @@ impl LocalMap {
             normals: Vec::new(),
             scans: Vec::new(),
             reaches: Vec::new(),
-            goes_on: Vec::new(),
             seen_through: Vec::new(),
             scans_through: settings.scans_through,
             index: VoxelIndex::default(),
@@ -74,16 +71,17 @@ impl LocalMap {
         Some(self.normals[number as usize]).filter(|normal| *normal != [0.0; 3])
     }
 
-    /// Whether the surface around a point goes on beyond its nearest neighbours: those may all lie on one scan line,
-    /// which in a corner lies in a plane of its own that is none of the scene's.
-    pub fn goes_on(&self, number: u32) -> bool {
-        *self.goes_on[number as usize].get_or_init(|| {
-            let mut found = Vec::new();
-            self.index.nearest_k(&self.points, self.points[number as usize], SURROUNDING, &mut found);
-            let around: Vec<Vector3<f64>> =
-                found.iter().map(|(_, index)| self.points[*index as usize].into()).collect();
-            surface_goes_on(&around)
-        })
+    /// Normals of two halves of the points that a point's normal is taken from; `None` where either half is on no plane.
+    pub fn half_normals(&self, number: u32) -> Option<[[f64; 3]; 2]> {
+        let mut found = Vec::new();
+        self.index.nearest_k(&self.points, self.points[number as usize], self.neighbors, &mut found);
+        // By turns, as they are sorted by their distance: both halves reach equally far.
+        let half = |first: usize| {
+            let some = found.iter().skip(first).step_by(2);
+            let plane = plane_of(some.map(|(_, index)| self.points[*index as usize]));
+            (plane.thickness <= MAX_HALF_THICKNESS).then_some(plane.normal)
+        };
+        Some([half(0)?, half(1)?])
     }
 
     /// Adds another map's points where they are after a motion.
@@ -118,13 +116,6 @@ impl LocalMap {
         self.normals.resize(self.points.len(), [0.0; 3]);
         self.reaches.resize(self.points.len(), f64::INFINITY);
         self.seen_through.resize(self.points.len(), 0);
-        if self.points.len() > before {
-            // A surface may go on where it did not before.
-            self.goes_on.iter_mut().filter(|known| known.get() == Some(&false)).for_each(|known| {
-                known.take();
-            });
-        }
-        self.goes_on.resize_with(self.points.len(), OnceLock::new);
         self.renew_normals(before);
     }
 
@@ -199,7 +190,6 @@ impl LocalMap {
         keep(&mut self.normals, &near);
         keep(&mut self.scans, &near);
         keep(&mut self.reaches, &near);
-        keep(&mut self.goes_on, &near);
         keep(&mut self.seen_through, &near);
         self.index = VoxelIndex::default();
         self.sparse.clear();

@@ -3,16 +3,16 @@
 //! A scan is thinned ([`thinned_scan`]) by lengths of the first one ([`scale`]), expected where the last motion leads, and
 //! aligned ([`scan_alignment`]) with the map of the surroundings ([`local_map`]). Where it lies there worse than scans
 //! did of late ([`expectation`]), it is searched: by other motions, by rotations of the sensor ([`rotation_search`]), and
-//! among keyframes ([`keyframes`]). Along motions that the map ([`map_surface`]) does not determine, as along a smooth
-//! corridor, the last motion goes on. [`tracker`] goes from scan to scan. Where it stays lost, or the lengths do not
+//! among keyframes ([`keyframes`]). Along motions that the map does not determine, as along a smooth corridor
+//! ([`half_normals`]), the last motion goes on. [`tracker`] goes from scan to scan. Where it stays lost, or the lengths do not
 //! fit, another map is begun ([`segment`], [`segments`]).
 
 mod correspondences;
 mod deskewing;
 mod expectation;
+mod half_normals;
 mod keyframes;
 mod local_map;
-mod map_surface;
 mod pose_covariance;
 mod result;
 mod rotation_search;

@@ -2,18 +2,19 @@
 
 use super::correspondences::Correspondences;
 use super::deskewing::{MotionWithin, joint_step, moved_slightly};
+use super::half_normals::HalfNormals;
 use super::local_map::LocalMap;
-use super::map_surface::MapSurface;
 use super::settings::ScanAlignmentSettings;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
 use crate::alignment::{
-    FreeDirection, GicpSettings, Rivals, blocks, clustered_covariance, gicp_with, halves, lengths,
-    orthonormal, solve_determined, systematic_covariance, unscaled,
+    FreeDirection, GicpSettings, Motions, UNOBSERVABLE, blocks, clustered_covariance, gicp_with, halves,
+    lengths, orthonormal, solve_determined, systematic_covariance, unscaled,
 };
 use crate::random::some_of;
 use crate::statistics::{DEVIATIONS_PER_MEDIAN, median};
 use nalgebra::{Matrix6, Vector3, Vector6};
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 /// Eigenvalues of the normal matrix below this share of the largest are rounding: no step goes there.
@@ -106,7 +107,7 @@ pub(super) fn align<F: Fn([f64; 3]) -> bool>(
     // Products of rotations are rotations but for rounding, which would grow with the trajectory.
     pose = RigidTransform::from_matrix(&pose.to_matrix()).unwrap_or(pose);
     let mut plane = PointToPlane::new(points, map, &pose, &mut correspondences, settings)?;
-    let free_directions = plane.free_directions(points, map, &pose, settings);
+    let free_directions = plane.free_directions(map, &pose, settings);
     let twists: Vec<Vector6<f64>> =
         free_directions.iter().flat_map(|direction| direction.twists([0.0; 3])).collect();
     if !twists.is_empty() {
@@ -206,8 +207,6 @@ struct PointToPlane {
     on_map: usize,
     information: Matrix6<f64>,
     gradient: Vector6<f64>,
-    /// Largest residual of an inlier.
-    limit: f64,
 }
 
 impl PointToPlane {
@@ -245,7 +244,6 @@ impl PointToPlane {
             on_map: 0,
             information: Matrix6::zeros(),
             gradient: Vector6::zeros(),
-            limit,
         };
         let to_scan = pose.inverse();
         for (number, ((other, residual), point)) in (0..).zip(found.iter().zip(&residuals).zip(points)) {
@@ -316,31 +314,27 @@ impl PointToPlane {
         )
     }
 
-    /// Motions of the scan, in its coordinates, that the map does not determine.
+    /// Motions of the scan, in its coordinates, that the map does not determine: along some its surface slides over
+    /// itself, and along others only errors of the map's normals would hold it.
     fn free_directions(
         &self,
-        scan: &[[f64; 3]],
         map: &LocalMap,
         pose: &RigidTransform,
         settings: &ScanAlignmentSettings,
     ) -> Vec<FreeDirection> {
-        let rivals_settings = settings.rivals;
-        let some: Vec<[f64; 3]> =
-            some_of(scan.len(), rivals_settings.points).into_iter().map(|number| scan[number]).collect();
-        let rivals = Rivals {
-            surface: MapSurface::new(map, self.limit, settings),
-            source: &some,
-            T_target_source: *pose,
-            radius: settings.rival_radius,
-            settings: rivals_settings,
-        };
-        let explained = rivals.explained();
-        let points = pose.transform_points(&self.points);
-        let normal = |row: &[f64; 6]| pose.transform_vector([row[3], row[4], row[5]]);
-        let normals: Vec<[f64; 3]> = self.design.iter().map(normal).collect();
-        let to_scan = pose.inverse();
-        let found = rivals.free_directions(&explained, &points, &normals);
-        found.iter().map(|direction| direction.transformed(&to_scan)).collect()
+        let normals: Vec<[f64; 3]> = self.design.iter().map(|row| [row[3], row[4], row[5]]).collect();
+        let motions = Motions::new(&self.points, &normals);
+        let halves = OnceCell::new();
+        motions.named(|sliding, number| {
+            let is_held = || {
+                let halves = halves.get_or_init(|| {
+                    let some = some_of(self.points.len(), settings.held_samples);
+                    HalfNormals::new(map, pose, some.into_iter().map(|i| (self.points[i], self.targets[i])))
+                });
+                halves.hold(|point| motions.velocity(number, point), settings)
+            };
+            sliding <= UNOBSERVABLE || sliding <= settings.weak && !is_held()
+        })
     }
 
     fn shares_of_scans(&self, map: &LocalMap) -> Vec<(u32, f64)> {

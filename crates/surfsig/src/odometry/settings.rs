@@ -5,7 +5,6 @@ mod relocalisation;
 pub use relocalisation::{RelocalisationSettings, SegmentSettings};
 
 use crate::Error;
-use crate::alignment::RivalSettings;
 use crate::visibility::RangeImageSettings;
 
 /// How [`crate::Odometry`] works. Nothing has to be set. `benchmarks/sweep_settings.py` shows what other values give on
@@ -137,13 +136,16 @@ pub struct ScanAlignmentSettings {
     /// Distance to the map's nearest point, in voxels, within which the map explains a point whatever the residual, as
     /// at edges, where the map's normal is none.
     pub explained_distance: f64,
-    /// When a motion is not determined by the map: the scan is pushed along weak ones.
-    pub rivals: RivalSettings,
-    /// Length, in voxels, that stands there for the radius of a patch: the scan is pushed by half of it, which in a
-    /// room is as far as in registration.
-    pub rival_radius: f64,
-    /// Steps point to plane of a scan that was pushed, at most.
-    pub rival_steps: usize,
+    /// The root mean square of the distances from the map's planes that a motion makes, over that of its points' paths,
+    /// below which a motion is weak: that much errors of the normals alone may say.
+    pub weak: f64,
+    /// Correspondences, at most, by which it is told whether the surface holds a weak motion, or errors of its normals do.
+    pub held_samples: usize,
+    /// Share of what the map's normals say about a motion that both halves of their neighbourhoods say alike, from which
+    /// on the surface holds it.
+    pub held_share: f64,
+    /// What both say alike, in standard errors, likewise.
+    pub held_deviations: f64,
     /// Steps point to plane once it is known which motions the map does not determine.
     pub constrained_steps: usize,
     /// Steps point to plane that refine the pose and the motion within a scan at once, where times are known.
@@ -170,9 +172,10 @@ impl Default for ScanAlignmentSettings {
             max_deviation: 3.0,
             min_deviation: 0.02,
             explained_distance: 1.2,
-            rivals: RivalSettings { points: 500, ..RivalSettings::default() },
-            rival_radius: 8.0,
-            rival_steps: 8,
+            weak: 0.25,
+            held_samples: 2000,
+            held_share: 0.5,
+            held_deviations: 3.0,
             constrained_steps: 3,
             deskew_steps: 3,
             deskew_deviation: 0.01,

@@ -90,8 +90,9 @@ fn other_kinds(region: &Region, scene: &Scene, kinds: &[SurfaceKind]) -> Vec<Pri
     };
     let mut found = Vec::new();
     // A sphere is what any few first points are near to; of all others only a simpler kind is tried, for what bends more
-    // reaches over their borders.
-    let is_tried = |kind: &&SurfaceKind| **kind < own || own == SurfaceKind::Sphere && **kind > own;
+    // reaches over their borders. So it does where neighbouring points err alike, which bends what is none.
+    let may_bend_more = own == SurfaceKind::Sphere && scene.likeness.alike <= 1.0;
+    let is_tried = |kind: &&SurfaceKind| **kind < own || may_bend_more && **kind > own;
     for &kind in kinds.iter().filter(is_tried) {
         let simpler = std::iter::once(&region.primitive).chain(&found);
         let bends: Vec<Primitive> = simpler.flat_map(|simpler| bent(simpler, kind, extent)).collect();

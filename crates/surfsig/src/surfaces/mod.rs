@@ -181,7 +181,7 @@ pub fn find_surfaces(
         let mut regions = regions(&mut scene, &kinds, evidence, levels, monitor)?;
         let mut inside = Stamps::new(scene.points.len());
         let mut share_out = |scene: &mut Scene, regions: &mut Vec<Region>| {
-            merging::merge(scene, regions);
+            merging::merge(scene, &kinds, regions);
             merging::assign(scene, regions);
             // Some may have lost their points to a nearer one.
             regions.retain(|region| evidence.counts(region, scene, &mut inside));
@@ -191,12 +191,7 @@ pub fn find_surfaces(
         if unexplained::add(&mut scene, &mut regions, &kinds, evidence, monitor)? {
             share_out(&mut scene, &mut regions);
         }
-        // The likelihood of another kind is that of points that err each for itself.
-        let is_independent = scene.likeness.alike <= 1.0;
-        if !scene.is_exact
-            && is_independent
-            && self::kinds::try_again(&mut scene, &mut regions, &kinds, evidence)
-        {
+        if !scene.is_exact && self::kinds::try_again(&mut scene, &mut regions, &kinds, evidence) {
             share_out(&mut scene, &mut regions);
         }
         pieces::join(&mut scene, &mut regions);

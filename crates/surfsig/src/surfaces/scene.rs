@@ -105,22 +105,24 @@ impl Scene {
         let Some(mut around) = Surroundings::new(&tree, positions, neighbours, monitor)? else {
             return Ok(None);
         };
+        let count = positions.len() as f64;
+        let origin = positions.iter().map(|p| Vector::from(*p)).sum::<Vector>() / count;
+        let points: Vec<Vector> = positions.iter().map(|p| Vector::from(*p) - origin).collect();
         let mut chosen: Vec<u32> = (0..positions.len() as u32).collect();
         if around.typical > CLUMPED * around.spacing {
             let edge = around.typical / VOXELS;
-            chosen = voxel_representatives(&PointCloud::new_f64(positions), Radius::new(edge)?)?;
-            let places: Vec<[f64; 3]> = chosen.iter().map(|&i| positions[i as usize]).collect();
+            // About the middle, so that the same voxels are taken wherever the cloud lies.
+            let centered: Vec<[f64; 3]> = points.iter().map(|&point| point.into()).collect();
+            chosen = voxel_representatives(&PointCloud::new_f64(&centered), Radius::new(edge)?)?;
+            let places: Vec<[f64; 3]> = chosen.iter().map(|&i| centered[i as usize]).collect();
             let of_chosen = KdTree::new(&places);
             let Some(thinned) = Surroundings::new(&of_chosen, &places, neighbours, monitor)? else {
                 return Ok(None);
             };
             around = thinned;
-            around.graph = around.graph.with_left_out(positions, &chosen, edge);
+            around.graph = around.graph.with_left_out(&centered, &chosen, edge);
         }
         let Surroundings { fits, graph, typical, spacing, is_even } = around;
-        let count = positions.len() as f64;
-        let origin = positions.iter().map(|p| Vector::from(*p)).sum::<Vector>() / count;
-        let points: Vec<Vector> = positions.iter().map(|p| Vector::from(*p) - origin).collect();
         drop(tree);
         let mut scene = Self {
             known: noise,
