@@ -54,10 +54,10 @@ impl Keyframes {
     }
 
     /// Keeps a scan, unless there is one of nearly the same pose; of too many keyframes the one leaves that has another
-    /// the nearest to it.
-    pub fn offer(&mut self, scan: &ThinnedScan, pose: &RigidTransform, number: u32) {
+    /// the nearest to it. Tells whether it is kept.
+    pub fn offer(&mut self, scan: &ThinnedScan, pose: &RigidTransform, number: u32) -> bool {
         if !self.is_new(pose) {
-            return;
+            return false;
         }
         let settings = &self.settings.relocalisation;
         self.kept.push(Keyframe {
@@ -72,6 +72,7 @@ impl Keyframes {
         if self.kept.len() > settings.max_kept {
             self.drop_one();
         }
+        true
     }
 
     /// Whether no keyframe in the present map has nearly this pose.
@@ -97,13 +98,40 @@ impl Keyframes {
 
     /// The map of the keyframes around a pose that are not in the present map, and the number of the nearest of them.
     pub fn unloaded_near(&self, pose: &RigidTransform, map_range: f64) -> Option<(LocalMap, u32)> {
+        self.near(pose, map_range, |other| !other.is_loaded)
+    }
+
+    /// The same of the keyframes of scans before one, whatever the map has.
+    pub fn earlier_near(
+        &self,
+        pose: &RigidTransform,
+        map_range: f64,
+        before: usize,
+    ) -> Option<(LocalMap, u32)> {
+        self.near(pose, map_range, |other| (other.number as usize) < before)
+    }
+
+    /// Whether there is a keyframe of a scan before one near a pose.
+    pub fn has_earlier_near(&self, pose: &RigidTransform, before: usize) -> bool {
+        self.nearest(pose, |other| (other.number as usize) < before).is_some()
+    }
+
+    fn near(
+        &self,
+        pose: &RigidTransform,
+        map_range: f64,
+        is_in: impl Fn(&Keyframe) -> bool,
+    ) -> Option<(LocalMap, u32)> {
+        let nearest = self.nearest(pose, &is_in)?;
+        Some((self.map_of(pose.translation.into(), map_range, &is_in), nearest.number))
+    }
+
+    /// Of some keyframes the one next to a pose, if a loop may close there.
+    fn nearest(&self, pose: &RigidTransform, is_in: impl Fn(&Keyframe) -> bool) -> Option<&Keyframe> {
         let distance = |other: &&Keyframe| (other.T_map_scan.translation - pose.translation).norm();
         let reach = self.settings.relocalisation.loop_distance * self.median_range;
-        let away = self.kept.iter().filter(|keyframe| !keyframe.is_loaded);
-        let nearest = away.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-        (distance(&nearest) <= reach).then(|| {
-            (self.map_of(pose.translation.into(), map_range, |other| !other.is_loaded), nearest.number)
-        })
+        let asked = self.kept.iter().filter(|keyframe| is_in(keyframe));
+        asked.min_by(|a, b| distance(a).total_cmp(&distance(b))).filter(|nearest| distance(nearest) <= reach)
     }
 
     /// The pose of a keyframe.

@@ -5,7 +5,8 @@
 //! did of late ([`expectation`]), it is searched: by other motions, by rotations of the sensor ([`rotation_search`]), and
 //! among keyframes ([`keyframes`]). Along motions that the map does not determine, as along a smooth corridor
 //! ([`half_normals`]), the last motion goes on. [`tracker`] goes from scan to scan. Where it stays lost, or the lengths do not
-//! fit, another map is begun ([`segment`], [`segments`]).
+//! fit, another map is begun ([`segment`], [`segments`]). Loops are looked for around where the sensor is expected, as far as
+//! the way around may have drifted ([`translation_search`]).
 
 mod correspondences;
 mod deskewing;
@@ -23,6 +24,7 @@ mod segments;
 mod settings;
 mod thinned_scan;
 mod tracker;
+mod translation_search;
 mod voxel_index;
 
 pub use result::{LoopClosure, ScanPose, ScanStatus};

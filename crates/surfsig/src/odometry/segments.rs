@@ -51,6 +51,8 @@ pub(super) struct Segments {
     worlds: usize,
     /// Scans so far that were searched in a past map.
     searched: usize,
+    /// The last scan that was looked for in a past map to close a loop.
+    last_loop_search: Option<usize>,
 }
 
 impl Segments {
@@ -63,6 +65,7 @@ impl Segments {
             count: 0,
             worlds: 0,
             searched: 0,
+            last_loop_search: None,
         }
     }
 
@@ -97,8 +100,20 @@ impl Segments {
         let steps = segment.follow(scan.as_ref());
         followed.disproved =
             segment.tracker.take_disproved().into_iter().map(|step| segment.first + step).collect();
-        followed.found = steps.iter().map(|step| segment.found(step)).collect();
         followed.loops = segment.take_loops();
+        let between = self.settings.relocalisation.scans_between_loops;
+        let is_due = self.last_loop_search.is_none_or(|last| number >= last + between);
+        if is_due
+            && followed.loops.is_empty()
+            && segment.tracker.is_at_sure_keyframe()
+            && let Some(step) = steps.last().filter(|step| segment.first + step.number == number)
+            && let Some((past, expected)) = past_around(past, segment, step, &self.settings)
+        {
+            self.last_loop_search = Some(number);
+            let found = closed_with_past(past, &expected, segment, &measured, step, &self.settings);
+            followed.loops.extend(found);
+        }
+        followed.found = steps.iter().map(|step| segment.found(step)).collect();
         let returned = steps.is_empty().then(|| search_past(past, &measured, self.searched, &self.settings));
         if returned.is_none() {
             past.iter_mut().for_each(|segment| segment.tracker.skip());
@@ -216,6 +231,62 @@ impl Segments {
         let both = anchor.covariance.and(&of_pose.scaled(segment.scale.voxel));
         Some((transform, both.carried(&transform)))
     }
+}
+
+/// The latest past map of the same world with a keyframe near a scan, of scans that are long ago, and where the scan is
+/// expected in it.
+fn past_around<'a>(
+    past: &'a [Segment],
+    present: &Segment,
+    step: &Step,
+    settings: &OdometrySettings,
+) -> Option<(&'a Segment, RigidTransform)> {
+    let (pose, _) = present.in_world(step);
+    let before = before_loop(present, step, settings);
+    past.iter().rev().filter(|past| past.number == present.number && past.first < before).find_map(|past| {
+        let mut expected = past.T_world_map.inverse() * pose;
+        expected.translation /= past.scale.voxel;
+        past.tracker.has_keyframe_near(&expected, before - past.first).then_some((past, expected))
+    })
+}
+
+/// The scan from which on keyframes are not long ago.
+fn before_loop(present: &Segment, step: &Step, settings: &OdometrySettings) -> usize {
+    (present.first + step.number).saturating_sub(settings.relocalisation.scans_apart as usize)
+}
+
+/// The loop that a scan closes where it lies on a past map, onto which the present map is moved.
+#[allow(non_snake_case)]
+fn closed_with_past(
+    past: &Segment,
+    expected: &RigidTransform,
+    present: &mut Segment,
+    measured: &MeasuredScan,
+    step: &Step,
+    settings: &OdometrySettings,
+) -> Option<FoundLoop> {
+    let within = present.tracker.expected_within();
+    let factor = present.scale.voxel / past.scale.voxel;
+    let twist = Vector6::from_fn(|k, _| within.twist[k] * if k < 3 { 1.0 } else { factor });
+    let within = MotionWithin { twist, ..past.tracker.expected_within() };
+    let thinned = past.thinned_with(measured, within, settings)?;
+    let before = before_loop(present, step, settings) - past.first;
+    let (there, keyframe, earlier) = past.tracker.seen_again(&thinned, expected, before)?;
+    let in_unit = |mut transform: RigidTransform| {
+        transform.translation *= past.scale.voxel;
+        transform
+    };
+    let (T_world_scan_before, _) = present.in_world(step);
+    let mut of_scan = step.T_map_scan;
+    of_scan.translation *= present.scale.voxel;
+    present.T_world_map = past.T_world_map * in_unit(there.T_map_scan) * of_scan.inverse();
+    Some(FoundLoop {
+        scan: present.first + step.number,
+        earlier: past.first + earlier,
+        origin: present.origin,
+        T_earlier_scan: in_unit(keyframe.inverse() * there.T_map_scan),
+        T_world_scan_before,
+    })
 }
 
 /// Searches a scan in one of the past maps, in which it then goes on: its index, and the poses that are found.

@@ -86,6 +86,8 @@ pub(super) struct Tracker {
     disproved: Vec<usize>,
     /// Loops that were closed, until they are asked for.
     loops: Vec<Loop>,
+    /// Whether the last scan has become a keyframe.
+    is_at_keyframe: bool,
     number: usize,
 }
 
@@ -119,6 +121,7 @@ impl Tracker {
             doubted: Vec::new(),
             disproved: Vec::new(),
             loops: Vec::new(),
+            is_at_keyframe: false,
             number: 0,
         }
     }
@@ -126,6 +129,11 @@ impl Tracker {
     /// Whether poses of the last scans wait for the next ones.
     pub fn is_on_trial(&self) -> bool {
         !self.trial.is_empty()
+    }
+
+    /// Whether the last scan has become a keyframe, and its pose is beyond doubt.
+    pub fn is_at_sure_keyframe(&self) -> bool {
+        self.is_at_keyframe && self.doubted.is_empty()
     }
 
     /// Ends tracking: only a search finds the sensor again.
@@ -163,6 +171,7 @@ impl Tracker {
 
     /// Finds the pose of the next scan: none if it is lost, and several where it confirms those before.
     pub fn follow(&mut self, scan: &ThinnedScan) -> Vec<Step> {
+        self.is_at_keyframe = false;
         let farthest = quantile(&mut distances(&scan.points, [0.0; 3]), MOST);
         let needed = self.settings.map.range_factor * farthest;
         self.map_range = self.fixed_map_range.unwrap_or(self.map_range.max(needed));

@@ -51,6 +51,15 @@ pub struct RelocalisationSettings {
     pub scans_apart: u32,
     /// Distance, in median ranges, within which such a keyframe is looked for.
     pub loop_distance: f64,
+    /// Step of the grid of translations that are tried there, in voxels: between two of them a scan is near enough to be
+    /// aligned.
+    pub drift_step: f64,
+    /// Such steps to either side along each axis: so far, some eight voxels, may a way around have drifted.
+    pub drift_steps: usize,
+    /// Such translations from which the scan is aligned, at most, the best first.
+    pub drift_trials: usize,
+    /// Scans after a search in a past map before the next one: it costs several tracked scans.
+    pub scans_between_loops: usize,
     /// Scans after a search before a pose is searched again that would be kept without.
     pub scans_between: usize,
     /// Step between the rotations about the sensor's axes that are tried at its last position, in radians: a point at
@@ -96,6 +105,10 @@ impl Default for RelocalisationSettings {
             max_kept: 400,
             scans_apart: 30,
             loop_distance: 0.6,
+            drift_step: 2.5,
+            drift_steps: 3,
+            drift_trials: 2,
+            scans_between_loops: 3,
             scans_between: 10,
             rotation_step: 8.0_f64.to_radians(),
             rotation_points: 300,

@@ -55,7 +55,7 @@ impl Tracker {
         self.map.add(near, number);
         self.mapped.resize(step.number + 1, None);
         self.mapped[step.number] = Some((pose, step.covariance));
-        self.keyframes.offer(scan, &pose, number);
+        self.is_at_keyframe = self.keyframes.offer(scan, &pose, number);
         self.last_mapped = Some(pose);
         steps
     }
