@@ -98,3 +98,19 @@ def test_a_map_is_fused_from_what_was_followed() -> None:
         found.map(scans, voxel=0.0)
     with pytest.raises(surfsig.InvalidInputError, match="there are 5 poses, but 4 scans"):
         found.map(scans[:4])
+
+
+@pytest.mark.slow
+def test_a_loop_closes_around_a_block() -> None:
+    """Corridors that lead around a block, seen by 16 lines; the path goes on for 5 m where it began."""
+    true = simulate.circuit_poses(side=40.0)
+    sensor = simulate.Lidar(lines=16, steps=300, elevation=(-15.0, 15.0), noise=0.01, max_range=25.0)
+    scene = simulate.circuit(3, side=40.0)
+    scans = [simulate.scan(scene, sensor, pose, seed=3000 + k) for k, pose in enumerate(true)]
+    found = surfsig.estimate_odometry(scans)
+    assert (found.segments == 0).all()
+    assert found.loops
+    assert all(loop.scan > 140 and loop.earlier < 10 for loop in found.loops)
+    relative = geometry.inverse(found.poses[0]) @ found.poses[-1]
+    expected = geometry.inverse(true[0]) @ true[-1]
+    assert np.linalg.norm(relative[:3, 3] - expected[:3, 3]) < 0.001 * found.length

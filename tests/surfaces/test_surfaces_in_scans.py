@@ -60,9 +60,9 @@ def test_the_gym_ball(shared_data: Path) -> None:
 
 
 def test_the_gym_ball_is_found_wherever_it_lies(shared_data: Path) -> None:
-    """Which points of its clumps were looked at depended on where the scan lay: moved, it was three cylinders."""
+    """Which points of its clumps were looked at depended on where it lay: moved, it was three cylinders."""
     points = surfsig.read(shared_data / "surfaces" / "gym_ball.xyz").points.astype(np.float64)
-    there, moved = surfsig.find_surfaces(points), surfsig.find_surfaces(points + [1.0, 2.0, 3.0])
+    there, moved = surfsig.find_surfaces(points), surfsig.find_surfaces(points + np.array([1.0, 2.0, 3.0]))
     assert [each.kind for each in moved] == [each.kind for each in there]
     assert [each.count for each in moved] == pytest.approx([each.count for each in there], abs=20)
 
