@@ -54,7 +54,7 @@ def open3d_fpfh(cloud: Cloud, radius: float, threads: int) -> Timed:
 
 def jakteristics_features(cloud: Cloud, radius: float, threads: int) -> Timed:
     """Time four of jakteristics' shape features."""
-    import jakteristics  # type: ignore[import-not-found]
+    import jakteristics  # type: ignore[import-not-found, import-untyped, unused-ignore]
 
     tree = jakteristics.cKDTree(cloud)
     features = []
