@@ -771,7 +771,7 @@ class OdometrySettings:
         """Largest point-to-plane residual of an inlier, in voxels."""
     @property
     def held_share(self) -> float:
-        """Share of what normals say about a motion that halves of their neighbourhoods say alike, to hold it."""
+        """Share of what normals say of a motion that halves of their neighbourhoods say alike, to hold it."""
     @property
     def map_range_factor(self) -> float:
         """Range of the map over the distance within which 99 in 100 points of a scan are."""
