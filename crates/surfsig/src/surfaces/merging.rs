@@ -2,7 +2,6 @@
 
 use super::growth::Region;
 use super::scene::{NONE, Scene};
-use crate::primitive::{SurfaceKind, start};
 use rustc_hash::FxHashMap;
 
 /// Pairs of neighbouring points by which two surfaces are next to each other.
@@ -11,9 +10,6 @@ const TOUCHING: usize = 8;
 /// Points that tell whether two surfaces are one.
 const SAMPLE: usize = 2000;
 
-/// Points from which a simpler kind begins.
-const SAMPLE_OF_SIMPLER: usize = 400;
-
 /// Root mean square of the smaller one's distances from the joint surface, in units of noise, up to which they are one.
 const NEAR: f64 = 2.0;
 
@@ -21,7 +17,7 @@ const NEAR: f64 = 2.0;
 const ROUNDS: usize = 4;
 
 /// Joins surfaces that one surface explains.
-pub(super) fn merge(scene: &mut Scene, kinds: &[SurfaceKind], regions: &mut Vec<Region>) {
+pub(super) fn merge(scene: &mut Scene, regions: &mut Vec<Region>) {
     loop {
         let mut pairs: Vec<((i32, i32), usize)> = touching(scene).into_iter().collect();
         pairs.retain(|(_, count)| *count >= TOUCHING);
@@ -35,7 +31,7 @@ pub(super) fn merge(scene: &mut Scene, kinds: &[SurfaceKind], regions: &mut Vec<
             }
             let (large, small) =
                 if regions[a].members.len() >= regions[b].members.len() { (a, b) } else { (b, a) };
-            if let Some(joined) = joined(scene, kinds, &regions[large], &regions[small]) {
+            if let Some(joined) = joined(scene, &regions[large], &regions[small]) {
                 for &member in &joined.members {
                     scene.labels[member as usize] = large as i32;
                 }
@@ -66,23 +62,12 @@ fn touching(scene: &Scene) -> FxHashMap<(i32, i32), usize> {
     pairs
 }
 
-/// Both as one surface of the kind that either has, or of a simpler one that bends, if that is as smooth: strips of a ball
-/// are nearly cylinders.
-fn joined(scene: &Scene, kinds: &[SurfaceKind], large: &Region, small: &Region) -> Option<Region> {
+/// Both as one surface of the kind that either has, if that is as smooth.
+fn joined(scene: &Scene, large: &Region, small: &Region) -> Option<Region> {
     let members = [&large.members[..], &small.members[..]].concat();
-    let both = Region { members, noise: large.noise.max(small.noise), ..large.clone() };
-    let [of_large, of_small] = [large, small].map(|of_kind| of_kind.primitive);
-    let own = [of_large.kind, of_small.kind];
-    // A plane is what any small enough parts are nearly.
-    let is_simpler = |kind: &&SurfaceKind| {
-        **kind != SurfaceKind::Plane && own.iter().all(|own| *own != SurfaceKind::Plane && *kind < own)
-    };
-    let simpler = kinds.iter().filter(is_simpler).filter_map(|&kind| {
-        let (points, normals) = scene.sample(&both.members, SAMPLE_OF_SIMPLER);
-        start(kind, &points, &normals)
-    });
-    [of_large, of_small].into_iter().chain(simpler).find_map(|primitive| {
-        let mut joined = Region { primitive, ..both.clone() };
+    [large, small].into_iter().find_map(|of_kind| {
+        let mut joined =
+            Region { members: members.clone(), noise: large.noise.max(small.noise), ..of_kind.clone() };
         joined.fit(scene, SAMPLE)?;
         // Among many points few do not show how far they are from the surface. Those that err alike may be far from it.
         let is_near = scene.likeness.alike > 1.0

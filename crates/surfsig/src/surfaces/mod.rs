@@ -181,7 +181,7 @@ pub fn find_surfaces(
         let mut regions = regions(&mut scene, &kinds, evidence, levels, monitor)?;
         let mut inside = Stamps::new(scene.points.len());
         let mut share_out = |scene: &mut Scene, regions: &mut Vec<Region>| {
-            merging::merge(scene, &kinds, regions);
+            merging::merge(scene, regions);
             merging::assign(scene, regions);
             // Some may have lost their points to a nearer one.
             regions.retain(|region| evidence.counts(region, scene, &mut inside));
