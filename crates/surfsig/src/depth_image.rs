@@ -1,5 +1,9 @@
 //! What a sensor saw around a piece of a scan, as a depth image; and whether poses of another piece agree.
 
+mod front;
+
+pub(crate) use front::Front;
+
 use crate::geometry::{RigidTransform, axes_across};
 use nalgebra::Vector3;
 

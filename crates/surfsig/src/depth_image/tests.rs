@@ -85,3 +85,53 @@ fn correspondences_are_the_points_there_in_the_axes_of_the_scan() {
     assert!(apart(near.place, [3.0, 4.0, 0.0]) <= 1.0 && apart(near.normal, UP) < 1e-6);
     assert_eq!(found[1], None);
 }
+
+#[test]
+fn what_a_surface_hides_of_itself_does_not_count() {
+    let image = image(None);
+    let front =
+        |places: &[SurfacePlace]| image.front(&image.to_image(&RigidTransform::identity()), places, 0.3, 3);
+    let square = board(-10..11, -10..11, 0.0);
+    let alone = front(&square);
+    assert_eq!((alone.facing, alone.confirmed, alone.pixels), (441, 441, 441));
+    let with_bottom = front(&[square, board(-10..11, -10..11, -5.0)].concat());
+    assert_eq!((with_bottom.facing, with_bottom.confirmed), (441, 441));
+    let faces_away = |mut point: SurfacePlace| {
+        point.normal = [0.0, 0.0, -1.0];
+        point
+    };
+    assert_eq!(front(&board(-5..6, -5..6, 0.0).into_iter().map(faces_away).collect::<Vec<_>>()).facing, 0);
+    let sunk = front(&board(-5..6, -5..6, -1.0));
+    assert_eq!((sunk.mismatched, sunk.hidden), (121, 0));
+    let above = front(&board(-5..6, -5..6, 5.0));
+    assert_eq!((above.contradicted, above.confirmed), (121, 0));
+    assert_eq!(front(&board(18..21, -1..2, 0.0)).missing, 9);
+    assert_eq!(front(&[]), Front::default());
+}
+
+#[test]
+fn beyond_an_outline_the_scan_steps_back_or_goes_on() {
+    let image = image(None);
+    let front =
+        |places: &[SurfacePlace]| image.front(&image.to_image(&RigidTransform::identity()), places, 0.3, 3);
+    let whole = front(&board(-10..11, -10..11, 0.0));
+    assert!(whole.outline > 100 && whole.goes_on == 0, "{whole:?}");
+    assert!(f64::from(whole.ends) > 0.9 * f64::from(whole.outline), "{whole:?}");
+    // Beside a corner some ways come from no confirmed place.
+    let part = front(&board(-5..4, -5..4, 0.0));
+    assert_eq!((part.outline, part.ends, part.goes_on), (128, 0, 104));
+}
+
+#[test]
+fn what_is_hidden_beside_what_is_confirmed_is_behind_a_step() {
+    let points = [board(-10..11, -10..11, 0.0), board(-30..31, -30..31, -10.0)].concat();
+    let image = DepthImage::new(&points, &vec![true; points.len()], FAR_ABOVE, 1.0, 30.0, None);
+    let front =
+        |places: &[SurfacePlace]| image.front(&image.to_image(&RigidTransform::identity()), places, 0.3, 3);
+    // Of a part of the wall the square hides the middle.
+    let behind = front(&board(-15..16, -15..16, -10.0));
+    assert!(behind.hidden > 400 && behind.covered > 50 && behind.not_covered == 0, "{behind:?}");
+    // A step that the square has not.
+    let stepped = front(&[board(-8..0, -8..9, 0.0), board(0..9, -8..9, -5.0)].concat());
+    assert!(stepped.covered == 0 && stepped.not_covered > 30, "{stepped:?}");
+}

@@ -13,6 +13,10 @@ use nalgebra::{Matrix6, Vector3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
+/// By how much the logarithm of the odds may grow when a transform is fitted to the scene's own points: those that are
+/// lower by as much are not given up before.
+const GAIN_OF_FIT: f64 = 2.0;
+
 /// A model that is looked for, with one of its sides out.
 pub(super) struct Sought<'a> {
     /// The model's number.
@@ -36,6 +40,8 @@ pub(super) struct Candidate<'a> {
     pub sought: Arc<Sought<'a>>,
     pub T_scene_model: RigidTransform,
     pub evidence: Evidence,
+    /// Whether it was fitted to the scene's own points.
+    pub is_fitted: bool,
 }
 
 impl Candidate<'_> {
@@ -98,6 +104,11 @@ impl Unexplained {
     }
 }
 
+/// Logarithm of the odds below which a transform is given up before it is fitted to the scene's own points.
+pub(super) fn least_before_fit(settings: &FindSettings) -> f64 {
+    log_odds(settings.min_score) - GAIN_OF_FIT
+}
+
 /// Takes the best candidate and its part of the scene away, until none is good enough; the best instance first.
 pub(super) fn accepted(
     mut candidates: Vec<Candidate<'_>>,
@@ -125,6 +136,12 @@ pub(super) fn accepted(
         if evidence.log_odds < least {
             continue;
         }
+        if !candidate.is_fitted && candidates.iter().any(|other| other.evidence.log_odds > evidence.log_odds)
+        {
+            // Fitted it is worse than it seemed: another one may be better.
+            candidates.push(Candidate { evidence, ..refined.candidate });
+            continue;
+        }
         let examined = refined.examined(evidence.support, unexplained.of(fitted), settings);
         let own = fitted.near(scene.scan.points.par_iter().copied(), settings.own_distance);
         let own: Vec<usize> = own.into_iter().filter(|&number| !is_taken[number]).collect();
@@ -139,7 +156,7 @@ pub(super) fn accepted(
                 other.evidence = other.judged(unexplained.of(other));
             }
         }
-        candidates.retain(|candidate| candidate.evidence.log_odds >= least);
+        candidates.retain(|candidate| candidate.evidence.log_odds >= least_before_fit(settings));
     }
     instances.sort_by(|a, b| b.score.total_cmp(&a.score));
     Ok(instances)
@@ -161,7 +178,8 @@ fn refined<'a>(
     let surface = TargetSurface::new(candidate.sought.model.points.clone(), voxel);
     // The model's surface is the target: it is whole, and denser than what is seen.
     let fit = surface.align(&sample, candidate.T_scene_model.inverse(), &settings.point_to_surface)?;
-    let fitted = Candidate { T_scene_model: fit.T_target_source.inverse(), ..candidate.clone() };
+    let fitted =
+        Candidate { T_scene_model: fit.T_target_source.inverse(), is_fitted: true, ..candidate.clone() };
     Some(Refined { candidate: fitted, fit, surface, sample })
 }
 

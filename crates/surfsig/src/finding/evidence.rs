@@ -3,14 +3,14 @@
 use super::FindSettings;
 use super::likelihood::Measures;
 use super::model::Model;
-use super::rim::Rim;
+use super::rim::{Rim, step_beyond_rim};
 use super::scene::SceneSurface;
 use crate::alignment::{FACING_AWAY, cosine_towards, transformed};
-use crate::depth_image::{ALIKE, DepthImage, FACING, Judgement, SurfacePlace, dot};
+use crate::depth_image::{ALIKE, DepthImage, FACING, Front, Judgement, SurfacePlace, dot};
 use crate::geometry::RigidTransform;
 use crate::kd_tree::KdTree;
 use crate::random::some_of;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::f64::consts::PI;
@@ -45,6 +45,13 @@ pub(super) struct ModelView<'a> {
     pub scene: Arc<SceneSurface>,
     /// Some of the model's samples.
     pub samples: Vec<SurfacePlace>,
+    /// All of them, where its front is judged.
+    front: Vec<SurfacePlace>,
+    /// From small motions, shifts and turns in units of the reach, to those that move the samples by as much in the mean
+    /// square; `None` where a motion moves none of them.
+    to_motions: Option<Matrix6<f64>>,
+    /// Whether the model goes all around.
+    is_closed: bool,
     viewpoint: Option<[f64; 3]>,
     /// From the model's middle, what is looked at.
     pub reach: f64,
@@ -74,6 +81,8 @@ struct Seen {
     visible: f64,
     /// Of each to the line of sight.
     cosines: Vec<f32>,
+    /// Of all the model's samples those that the model itself does not hide, and its outline, where that is looked at.
+    front: Option<Front>,
 }
 
 impl<'a> ModelView<'a> {
@@ -93,7 +102,26 @@ impl<'a> ModelView<'a> {
         let samples = model.surface(&order);
         let rim = Rim::new(model, &samples, scene.voxel, scene.spacing);
         let most_seen = most_seen(&samples);
-        Self { rim, scene, viewpoint, reach: REACH * model.extent(), most_seen, samples, settings }
+        let (front, reach) = (Vec::new(), REACH * model.extent());
+        let to_motions = to_motions(&samples, reach);
+        Self {
+            rim,
+            scene,
+            viewpoint,
+            reach,
+            most_seen,
+            samples,
+            front,
+            to_motions,
+            is_closed: model.is_closed(),
+            settings,
+        }
+    }
+
+    /// The same, which judges the model's front and its outline, too; of few samples neither has a picture.
+    pub fn with_front(self, model: &Model) -> Self {
+        let all: Vec<usize> = (0..model.samples.len()).collect();
+        Self { front: model.surface(&all), ..self }
     }
 
     /// Transforms, fitted to the scene's surface near them by point to plane; distances are in voxels.
@@ -128,8 +156,14 @@ impl<'a> ModelView<'a> {
             let facing = facing as f64 / self.samples.len().max(1) as f64;
             let confirmed = f64::from(judgement.confirmed);
             let visible = confirmed / facing.max(confirmed).max(1e-9);
-            self.weighed(transform, Some(&Seen { judgement, visible, cosines }), is_free)
+            let front = (!self.front.is_empty()).then(|| self.front(image, local));
+            self.weighed(transform, Some(&Seen { judgement, visible, cosines, front }), is_free)
         })
+    }
+
+    fn front(&self, image: &DepthImage, local: &RigidTransform) -> Front {
+        let beyond = step_beyond_rim(self.scene.voxel, self.scene.spacing) / self.scene.voxel;
+        image.front(&image.to_image(local), &self.front, self.scene.voxel as f32, beyond.ceil() as i32)
     }
 
     /// The support of each transform by depth images alone, which costs little; there is a viewpoint.
@@ -210,7 +244,21 @@ impl<'a> ModelView<'a> {
             return Evidence::none(support, visible, overlap);
         }
         let on = || (0..moved.len()).filter(|&sample| is_touching[sample]);
+        let front = seen.and_then(|seen| seen.front).unwrap_or_default();
+        let of = |count: u32, all: u32| f64::from(count) / f64::from(all.max(1));
+        let told = front.confirmed + front.mismatched + front.contradicted + front.missing;
         let measures = Measures {
+            front_confirmed: of(front.confirmed, front.facing),
+            front_hidden: of(front.hidden, front.facing),
+            front_mismatched: of(front.mismatched, told),
+            front_contradicted: of(front.contradicted, told),
+            front_missing: of(front.missing, told),
+            pixels: f64::from(front.pixels),
+            outline_ends: of(front.ends, front.outline),
+            // A view ends wherever something was before it.
+            outline_goes_on: if self.is_closed { of(front.goes_on, front.outline) } else { 0.0 },
+            uncovered: of(front.not_covered, front.pixels),
+            constraint: self.constraint(on().map(|sample| &self.samples[sample])),
             support,
             confirmed: f64::from(judgement.confirmed) / self.most_seen,
             visible,
@@ -223,11 +271,26 @@ impl<'a> ModelView<'a> {
             resolution: self.reach / self.scene.voxel,
         };
         let log_odds = if seen.is_some() {
-            measures.log_odds()
+            if self.front.is_empty() { measures.log_odds_of_samples() } else { measures.log_odds() }
         } else {
             measures.log_odds_without_free_space(self.rim.too_much, self.settings)
         };
         Evidence { support, measures, log_odds, visible, overlap }
+    }
+
+    /// How well some samples determine the transform; see [`Measures::constraint`].
+    fn constraint<'b>(&self, samples: impl Iterator<Item = &'b SurfacePlace>) -> f64 {
+        let (mut squares, mut count) = (Matrix6::zeros(), 0.0);
+        for sample in samples {
+            let [place, normal] = [sample.place, sample.normal].map(|x| Vector3::from(x.map(f64::from)));
+            let turn = place.cross(&normal) / self.reach;
+            let change = Vector6::new(normal.x, normal.y, normal.z, turn.x, turn.y, turn.z);
+            squares += change * change.transpose();
+            count += 1.0;
+        }
+        let Some(to_motions) = self.to_motions.filter(|_| count > 0.0) else { return 0.0 };
+        let relative = to_motions * (squares / count) * to_motions.transpose();
+        relative.symmetric_eigenvalues().min().max(0.0)
     }
 
     /// Mean agreement in residual and normal of pairs of a sample and the scene's near it: 1 on the same surface.
@@ -246,6 +309,19 @@ impl<'a> ModelView<'a> {
         }
         if count > 0.0 { sum / count } else { 0.0 }
     }
+}
+
+/// See [`ModelView::to_motions`].
+fn to_motions(samples: &[SurfacePlace], reach: f64) -> Option<Matrix6<f64>> {
+    let mut squares = Matrix6::zeros();
+    for sample in samples {
+        let across = Vector3::from(sample.place.map(f64::from)).cross_matrix() / reach;
+        let mut moved = Matrix3x6::zeros();
+        moved.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
+        moved.fixed_view_mut::<3, 3>(0, 3).copy_from(&-across);
+        squares += moved.transpose() * moved;
+    }
+    (squares / samples.len().max(1) as f64).cholesky()?.l().try_inverse()
 }
 
 /// The largest share of samples that face one of many directions, spread over the sphere by the golden angle.

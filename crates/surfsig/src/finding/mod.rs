@@ -25,7 +25,7 @@ pub use settings::FindSettings;
 use crate::geometry::RigidTransform;
 use crate::scan::CenteredScan;
 use crate::{Error, FieldPlaces, Monitor, Scan, with_threads};
-use acceptance::{Candidate, Sought, accepted};
+use acceptance::{Candidate, Sought, accepted, least_before_fit};
 use evidence::ModelView;
 use model::{MIN_POINTS, SPACINGS_PER_RADIUS};
 use proposals::{different, proposed_transforms, raw_transforms};
@@ -143,16 +143,17 @@ fn candidates_of<'a>(
         if tried.is_empty() {
             continue;
         }
-        let last = view(&fine, settings.fine_points);
+        let last = view(&fine, settings.fine_points).with_front(&side);
         let aligned = last.aligned(&tried, settings.fine_distances, settings.aligned_points);
         let judged = last.judged(&aligned, &vec![true; fine.samples().len()]);
         let sought = Arc::new(Sought::new(number, side, last));
-        let least = log_odds(settings.min_score);
+        let least = least_before_fit(settings);
         let good = aligned.into_iter().zip(judged).filter(|(_, found)| found.log_odds >= least);
         candidates.extend(good.map(|(transform, evidence)| Candidate {
             sought: Arc::clone(&sought),
             T_scene_model: transform,
             evidence,
+            is_fitted: false,
         }));
     }
     monitor.add(FIND_STEPS_PER_MODEL - 1);

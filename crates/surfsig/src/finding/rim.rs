@@ -42,10 +42,15 @@ pub(super) struct Rim {
     pub too_much: f64,
 }
 
+/// The way along the surface from a model's end to where the scene must not go on, in the scan's unit.
+pub(super) fn step_beyond_rim(voxel: f64, spacing: f64) -> f64 {
+    (STEP * voxel).max(STEP_IN_SPACINGS * spacing)
+}
+
 impl Rim {
     /// Steps from samples, which are some of the model's.
     pub fn new(model: &Model, samples: &[SurfacePlace], voxel: f64, spacing: f64) -> Self {
-        let step_length = (STEP * voxel).max(STEP_IN_SPACINGS * spacing);
+        let step_length = step_beyond_rim(voxel, spacing);
         let tree = KdTree::new(&model.points);
         let is_closed = model.is_closed();
         let mean = model.normals.iter().map(|&normal| Vector3::from(normal)).sum::<Vector3<f64>>();

@@ -278,3 +278,32 @@ fn mistakes_are_told() {
     let sphere = [[1.0_f32, 0.0, 0.0], [-1.0, 0.0, 0.0]];
     assert_eq!((mean_length(sphere.iter()), mean_length([].iter())), (0.0, 0.0));
 }
+
+#[test]
+fn what_is_round_is_not_determined_and_a_front_ends_where_nothing_is_beyond() {
+    let (settings, viewpoint, voxel) = (FindSettings::default(), [0.0, 0.0, 50.0], 0.12);
+    let measures = |all: Vec<([f64; 3], Vector3<f64>)>| {
+        let seen = model_of(all.iter().filter(|(_, normal)| normal.z > 0.3).copied().collect());
+        let model = model_of(all);
+        let view = ModelView::new(&model, surface_of(&seen, voxel), Some(viewpoint), usize::MAX, &settings);
+        let is_free = vec![true; seen.samples.len()];
+        let judge = |view: &ModelView<'_>| view.judged(&[RigidTransform::identity()], &is_free)[0].measures;
+        assert_eq!(judge(&view).pixels, 0.0, "few samples have no front");
+        judge(&view.with_front(&model))
+    };
+    let golden = PI * (3.0 - 5.0_f64.sqrt());
+    let on_ball = |i: u32| {
+        let z = 1.0 - f64::from(2 * i + 1) / 4000.0;
+        let (sine, cosine) = (golden * f64::from(i)).sin_cos();
+        let normal = Vector3::new((1.0 - z * z).sqrt() * cosine, (1.0 - z * z).sqrt() * sine, z);
+        ((normal * 1.5).into(), normal)
+    };
+    let (ball, uneven) = (measures((0..4000).map(on_ball).collect()), measures(body(4000)));
+    assert!(ball.constraint < 1e-6, "any turn leaves a ball as it is: {ball:?}");
+    assert!(uneven.constraint > 0.003, "{uneven:?}");
+    for found in [ball, uneven] {
+        assert!(found.front_confirmed > 0.95 && found.front_hidden < 0.02, "{found:?}");
+        assert!(found.outline_ends > 0.5 && found.outline_goes_on < 0.05, "{found:?}");
+        assert!(found.pixels > 200.0 && found.uncovered < 0.05, "{found:?}");
+    }
+}
