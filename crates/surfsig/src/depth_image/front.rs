@@ -43,9 +43,8 @@ pub(crate) struct Front {
     pub ends: u32,
     /// Those over which it goes on smoothly.
     pub goes_on: u32,
-    /// Ways from a confirmed place to a hidden one near it, on which the scan's surface steps towards the sensor.
-    pub covered: u32,
-    /// Those on which it does not: nothing is there that can hide it.
+    /// Ways from a confirmed place to a hidden one near it, on which the scan's surface has no step towards the sensor:
+    /// nothing is there that can hide it.
     pub not_covered: u32,
 }
 
@@ -244,11 +243,8 @@ impl DepthImage {
         let seen =
             |steps: i32| self.pixel(beside(pixel, way, steps)).filter(|pixel| pixel.seen != Seen::Nothing);
         let depths: Vec<f32> = (0..=hidden).filter_map(seen).map(|pixel| self.at(pixel).place[2]).collect();
-        if depths.windows(2).any(|pair| pair[1] - pair[0] < -STEP * tolerance) {
-            front.covered += 1;
-        } else {
-            front.not_covered += 1;
-        }
+        let is_covered = depths.windows(2).any(|pair| pair[1] - pair[0] < -STEP * tolerance);
+        front.not_covered += u32::from(!is_covered);
     }
 
     fn pixel(&self, at: [i32; 2]) -> Option<&Pixel> {
