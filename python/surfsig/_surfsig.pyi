@@ -158,10 +158,9 @@ class RegistrationSettings:
         rival_proposals: int | None = None,
         rival_least_score: float | None = None,
         rival_distance: float | None = None,
-        rival_push: float | None = None,
-        rival_nudge: float | None = None,
-        rival_nudge_deficit: float | None = None,
         rival_weak: float | None = None,
+        rival_held_share: float | None = None,
+        rival_held_deviations: float | None = None,
         rival_deficit: float | None = None,
         rival_deviations: float | None = None,
         free_space_pixel: float | None = None,
@@ -235,17 +234,14 @@ class RegistrationSettings:
     def rival_distance(self) -> float:
         """Radii of a patch by which a rival moves points elsewhere, at least."""
     @property
-    def rival_push(self) -> float:
-        """Radii of a patch by which the source is pushed along motions that are weakly held."""
-    @property
-    def rival_nudge(self) -> float:
-        """Part of such a push that alone must leave the source on the surface."""
-    @property
-    def rival_nudge_deficit(self) -> float:
-        """What the source explains less then, as a share, to be held."""
-    @property
     def rival_weak(self) -> float:
         """Distances from the surface over the points' paths, below which a motion is weakly held."""
+    @property
+    def rival_held_share(self) -> float:
+        """Share of what normals of both scans say about a weak motion that both say alike, to hold it."""
+    @property
+    def rival_held_deviations(self) -> float:
+        """What both say alike, in standard errors, likewise."""
     @property
     def rival_deficit(self) -> float:
         """What a rival explains less, as a share, at least, to be refuted."""

@@ -63,14 +63,12 @@ settings_class! {
         rival_least_score: f64 = rivals.least_score,
         /// Radii of a patch by which a rival moves points elsewhere, at least.
         rival_distance: f64 = rivals.distance,
-        /// Radii of a patch by which the source is pushed along motions that are weakly held.
-        rival_push: f64 = rivals.push,
-        /// Part of such a push that alone must leave the source on the surface.
-        rival_nudge: f64 = rivals.nudge,
-        /// What the source explains less then, as a share, to be held.
-        rival_nudge_deficit: f64 = rivals.nudge_deficit,
         /// Distances from the surface over the points' paths, below which a motion is weakly held.
         rival_weak: f64 = rivals.weak,
+        /// Share of what normals of both scans say about a weak motion that both say alike, to hold it.
+        rival_held_share: f64 = rivals.held_share,
+        /// What both say alike, in standard errors, likewise.
+        rival_held_deviations: f64 = rivals.held_deviations,
         /// What a rival explains less, as a share, at least, to be refuted.
         rival_deficit: f64 = rivals.deficit,
         /// The same in its standard errors.

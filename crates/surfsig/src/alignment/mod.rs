@@ -2,9 +2,10 @@
 //!
 //! Matches propose a transform ([`consensus`]), distributions refine it ([`gicp`]), points fit it to the surface
 //! ([`point_to_surface`]), many at once are fitted to tangent planes ([`point_to_plane`]), and [`observability`] tells in
-//! which directions nothing determines it, whose variance is infinite ([`open_covariance`]). [`rivals`] are transforms
-//! that explain as much, some of them proposed by [`symmetry`]; [`faces`] of buildings propose transforms, too; [`scale`] tells whether both surfaces are of one size;
-//! and [`halves`] of an overlap tell what blocks of neighbours cannot see.
+//! which directions nothing determines it, or, by [`independent_normals`], only errors of normals do; their variance is
+//! infinite ([`open_covariance`]). [`rivals`] are transforms that explain as much, some of them proposed by [`symmetry`];
+//! [`faces`] of buildings propose transforms, too; [`scale`] tells whether both surfaces are of one size; and [`halves`] of
+//! an overlap tell what blocks of neighbours cannot see.
 
 mod clustered_covariance;
 mod consensus;
@@ -15,6 +16,7 @@ mod faces;
 mod gicp;
 mod gicp_cloud;
 mod halves;
+mod independent_normals;
 mod least_squares;
 mod observability;
 mod open_covariance;
@@ -35,6 +37,7 @@ pub use gicp::{GicpResult, GicpSettings, gicp};
 pub use gicp_cloud::GicpCloud;
 pub(crate) use gicp_cloud::{GicpTarget, plane_of};
 pub(crate) use halves::{halves, systematic_covariance};
+pub(crate) use independent_normals::{HeldLimits, IndependentNormals};
 pub(crate) use least_squares::{LinearisedDistances, solve_determined};
 pub use observability::{FreeDirection, free_directions};
 pub(crate) use observability::{Motions, UNOBSERVABLE};

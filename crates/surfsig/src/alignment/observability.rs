@@ -129,12 +129,6 @@ impl Motions {
         let rotation = motion.fixed_rows::<3>(0) / self.unit;
         motion.fixed_rows::<3>(3) + rotation.cross(&(Vector3::from(*point) - self.center))
     }
-
-    /// The transform that carries points so far along a motion, in the root mean square.
-    pub fn along(&self, number: usize, length: f64) -> RigidTransform {
-        let [x, y, z, translation @ ..] = <[f64; 6]>::from(self.all[number].1 * length);
-        RigidTransform::about(self.center.into(), [x, y, z].map(|angle| angle / self.unit), translation)
-    }
 }
 
 /// Rotations and translations that span free motions, which are twists about `center` with rotations in units of

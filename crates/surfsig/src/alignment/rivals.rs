@@ -1,9 +1,8 @@
-//! Whether another transform explains as much as the best one: proposed ones, and pushes along motions that little
-//! holds.
+//! Whether another transform, of those that were proposed, explains as much as the best one.
 
 use super::doubt::Doubt;
 use super::explained::{Closeness, Explained, HIDDEN, explained_share};
-use super::observability::{FreeDirection, Motions, UNOBSERVABLE};
+use super::independent_normals::HeldLimits;
 use super::point_to_surface::{PointToSurfaceSettings, TargetSurface};
 use super::scale::Scale;
 use crate::geometry::RigidTransform;
@@ -97,18 +96,14 @@ pub struct RivalSettings {
     pub least_score: f64,
     /// Root mean square of the distances by which a rival moves points elsewhere, at least.
     pub distance: f64,
-    /// How far the source is pushed along motions that are weakly held. With 0.15 the scan lines of a smooth corridor
-    /// pull it back where nothing else holds it (3 of 6 corridors are seen to be free), with 0.6 they do not (6 of 6).
-    pub push: f64,
-    /// Part of such a push that alone, without a fit, must leave the source on the surface where a motion is free: a
-    /// large one may take the few points that hold it to another surface.
-    pub nudge: f64,
-    /// What the source explains less then, as a share, to be held: in smooth corridors, tunnels and on planes it loses
-    /// nothing but noise, and shallow niches are a few in a hundred of a corridor's points.
-    pub nudge_deficit: f64,
     /// The root mean square of the distances from the surface over the points' paths, below which a motion is weakly
     /// held.
     pub weak: f64,
+    /// Share of what the normals of each scan say about a weak motion that both say alike, from which on the surface holds
+    /// it: 0.7 and more of what corridors with niches hold, 0.3 and less of smooth corridors (`benchmarks/trust.py`).
+    pub held_share: f64,
+    /// What both say alike, in standard errors, likewise.
+    pub held_deviations: f64,
     /// What a rival explains less, as a share of what the best one explains, to be refuted.
     pub deficit: f64,
     /// The same in its standard errors.
@@ -122,13 +117,18 @@ impl Default for RivalSettings {
             proposals: 8,
             least_score: 0.1,
             distance: 1.0,
-            push: 0.5,
-            nudge: 0.33,
-            nudge_deficit: 0.01,
             weak: 0.25,
+            held_share: 0.5,
+            held_deviations: 3.0,
             deficit: 0.03,
             deviations: 3.0,
         }
+    }
+}
+
+impl RivalSettings {
+    pub(crate) fn held(&self) -> HeldLimits {
+        HeldLimits { share: self.held_share, deviations: self.held_deviations }
     }
 }
 
@@ -207,40 +207,6 @@ impl<S: FittedSurface> Rivals<'_, S> {
             }
         }
         found
-    }
-
-    /// Motions that inliers, of which points and normals are given in the target, do not determine: along some the
-    /// surface slides over itself, along others it does not come back when it is pushed, and explains as much.
-    pub fn free_directions(
-        &self,
-        explained: &Explained,
-        points: &[[f64; 3]],
-        normals: &[[f64; 3]],
-    ) -> Vec<FreeDirection> {
-        let motions = Motions::new(points, normals);
-        let length = self.settings.push * self.radius;
-        motions.named(|sliding, number| {
-            sliding <= UNOBSERVABLE
-                || sliding <= self.settings.weak && {
-                    let pushed = |length: f64| motions.along(number, length) * self.T_target_source;
-                    let nudge = self.settings.nudge * length;
-                    let slides = |length: f64| {
-                        !self.is_refuted(
-                            explained,
-                            &self.closeness(&pushed(length)),
-                            self.settings.nudge_deficit,
-                        )
-                    };
-                    let stays_away = |length: f64| {
-                        self.as_good(explained, pushed(length), |_| self.settings.deficit).is_some_and(
-                            |(transform, _)| {
-                                self.displacement(&transform, &self.T_target_source) > 0.5 * length.abs()
-                            },
-                        )
-                    };
-                    [nudge, -nudge].into_iter().all(slides) && [length, -length].into_iter().any(stays_away)
-                }
-        })
     }
 
     /// Whether so much less is explained that it is no chance; also where much less of the surface is met.

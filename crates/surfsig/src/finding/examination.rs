@@ -3,11 +3,14 @@
 use super::FindSettings;
 use super::acceptance::Candidate;
 use crate::alignment::{
-    Doubt, FittedTarget, FreeDirection, PointToSurface, PointToSurfaceSettings, Rivals, ScaleLimits,
-    TargetSurface, symmetries,
+    Doubt, FittedTarget, FreeDirection, GicpCloud, PointToSurface, PointToSurfaceSettings, Rivals,
+    ScaleLimits, TargetSurface, symmetries,
 };
 use crate::geometry::RigidTransform;
 use crate::random::some_of;
+
+/// Voxels within which the normal of a voxel is that of a point: its own or a neighbouring one.
+const NORMAL_REACH: f64 = 2.0;
 
 /// A candidate, fitted to the points of the scene that are its own.
 pub(super) struct Refined<'a> {
@@ -74,7 +77,13 @@ impl Refined<'_> {
             .map(|(transform, _)| transform.inverse())
             .filter(is_as_good)
             .collect();
-        let free_directions = rivals.free_directions(&best, &self.fit.points, &self.fit.normals);
+        let clouds = [self.sample.clone(), self.surface.points().to_vec()].map(GicpCloud::new);
+        let free_directions = self.fit.free_directions(
+            [&clouds[0], &clouds[1]],
+            NORMAL_REACH * sought.view.scene.voxel,
+            settings.rivals.weak,
+            settings.rivals.held(),
+        );
         let limits = ScaleLimits { doubted: settings.doubted_scale, deviations: settings.scale_deviations };
         let (scale, doubt) = rivals.surface.scale(&moved, &best, limits);
         let mut doubts: Vec<Doubt> = doubt.into_iter().collect();

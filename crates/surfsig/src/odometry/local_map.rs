@@ -225,8 +225,12 @@ fn keep<T>(values: &mut Vec<T>, kept: &[bool]) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::settings::ScanAlignmentSettings;
     use super::*;
     use crate::KdTree;
+    use crate::alignment::{HeldLimits, IndependentNormals};
+    use crate::random::uniform;
+    use nalgebra::Vector3;
     use proptest::prelude::*;
 
     fn map_of(scans: &[Vec<[f64; 3]>]) -> LocalMap {
@@ -249,6 +253,31 @@ mod tests {
             (0..3).map(|k| (normal[k] - expected[k].copysign(expected[k] * along)).abs()).fold(0.0, f64::max)
         };
         map.points().iter().zip(&map.normals).map(error).fold(0.0, f64::max)
+    }
+
+    /// Whether a noisy floor, with a step of a height in its middle, holds what moves along x.
+    fn is_held(noise: f64, height: f64) -> bool {
+        let mut map = LocalMap::new(&MapSettings::default());
+        let at = |i: usize, k: u64| uniform(i, k) - 0.5;
+        let floor = (0..20_000).map(|i| {
+            let x = 80.0 * at(i, 0);
+            [x, 60.0 * at(i, 1), noise * at(i, 2) + if x > 0.0 { height } else { 0.0 }]
+        });
+        let riser = (0..(60.0 * height * 4.0) as usize)
+            .map(|i| [noise * at(i, 3), 60.0 * at(i, 4), height * (0.5 + at(i, 5))]);
+        map.add(floor.chain(riser), 0);
+        let halves = (0..).zip(map.points()).filter_map(|(i, point)| Some((*point, map.half_normals(i)?)));
+        let ScanAlignmentSettings { held_share, held_deviations, .. } = ScanAlignmentSettings::default();
+        let limits = HeldLimits { share: held_share, deviations: held_deviations };
+        IndependentNormals::new(halves).hold(|_| Vector3::x(), limits)
+    }
+
+    #[test]
+    fn errors_of_normals_hold_nothing_and_a_step_does() {
+        for noise in [0.05, 0.3, 0.6] {
+            assert!(!is_held(noise, 0.0), "a floor with noise {noise}");
+            assert!(is_held(noise, 5.0), "a step with noise {noise}");
+        }
     }
 
     proptest! {

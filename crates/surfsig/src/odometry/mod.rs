@@ -4,14 +4,13 @@
 //! aligned ([`scan_alignment`]) with the map of the surroundings ([`local_map`]). Where it lies there worse than scans
 //! did of late ([`expectation`]), it is searched: by other motions, by rotations of the sensor ([`rotation_search`]), and
 //! among keyframes ([`keyframes`]). Along motions that the map does not determine, as along a smooth corridor
-//! ([`half_normals`]), the last motion goes on. [`tracker`] goes from scan to scan. Where it stays lost, or the lengths do not
+//! (halves of the map's neighbourhoods tell), the last motion goes on. [`tracker`] goes from scan to scan. Where it stays lost, or the lengths do not
 //! fit, another map is begun ([`segment`], [`segments`]). Loops are looked for around where the sensor is expected, as far as
 //! the way around may have drifted ([`translation_search`]).
 
 mod correspondences;
 mod deskewing;
 mod expectation;
-mod half_normals;
 mod keyframes;
 mod local_map;
 mod pose_covariance;

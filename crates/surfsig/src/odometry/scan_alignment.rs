@@ -2,14 +2,14 @@
 
 use super::correspondences::Correspondences;
 use super::deskewing::{MotionWithin, joint_step, moved_slightly};
-use super::half_normals::HalfNormals;
 use super::local_map::LocalMap;
 use super::settings::ScanAlignmentSettings;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
 use crate::alignment::{
-    FreeDirection, GicpSettings, Motions, UNOBSERVABLE, blocks, clustered_covariance, gicp_with, halves,
-    lengths, orthonormal, solve_determined, systematic_covariance, unscaled,
+    FreeDirection, GicpSettings, HeldLimits, IndependentNormals, Motions, UNOBSERVABLE, blocks,
+    clustered_covariance, gicp_with, halves, lengths, orthonormal, solve_determined, systematic_covariance,
+    unscaled,
 };
 use crate::random::some_of;
 use crate::statistics::{DEVIATIONS_PER_MEDIAN, median};
@@ -325,16 +325,24 @@ impl PointToPlane {
         let normals: Vec<[f64; 3]> = self.design.iter().map(|row| [row[3], row[4], row[5]]).collect();
         let motions = Motions::new(&self.points, &normals);
         let halves = OnceCell::new();
+        let limits = HeldLimits { share: settings.held_share, deviations: settings.held_deviations };
         motions.named(|sliding, number| {
             let is_held = || {
-                let halves = halves.get_or_init(|| {
-                    let some = some_of(self.points.len(), settings.held_samples);
-                    HalfNormals::new(map, pose, some.into_iter().map(|i| (self.points[i], self.targets[i])))
-                });
-                halves.hold(|point| motions.velocity(number, point), settings)
+                let halves = halves.get_or_init(|| self.half_normals(map, pose, settings.held_samples));
+                halves.hold(|point| motions.velocity(number, point), limits)
             };
             sliding <= UNOBSERVABLE || sliding <= settings.weak && !is_held()
         })
+    }
+
+    /// Normals of both halves of the map's neighbourhoods at some of the points, in the scan's coordinates.
+    fn half_normals(&self, map: &LocalMap, pose: &RigidTransform, samples: usize) -> IndependentNormals {
+        let to_scan = pose.inverse();
+        let of_point = |i: usize| {
+            let halves = map.half_normals(self.targets[i])?;
+            Some((self.points[i], halves.map(|half| to_scan.transform_vector(half))))
+        };
+        IndependentNormals::new(some_of(self.points.len(), samples).into_iter().filter_map(of_point))
     }
 
     fn shares_of_scans(&self, map: &LocalMap) -> Vec<(u32, f64)> {

@@ -3,15 +3,21 @@
 use super::free_space::BothSensors;
 use super::settings::RegistrationSettings;
 use crate::alignment::{
-    Alternative, Doubt, FittedTarget, FreeDirection, PointToSurface, Rivals, ScaleLimits, TargetSurface,
-    symmetries,
+    Alternative, Doubt, FittedTarget, FreeDirection, GicpCloud, PointToSurface, RivalSettings, Rivals,
+    ScaleLimits, TargetSurface, symmetries,
 };
 use crate::geometry::RigidTransform;
 use crate::random::some_of;
 
+/// Voxels within which the normal of a scan's voxel is that of a point: its own or a neighbouring one.
+const NORMAL_REACH: f64 = 2.0;
+
 /// Two scans about their middles, of which transforms are judged.
 pub(super) struct Judge<'a> {
     pub surface: &'a TargetSurface,
+    /// The source and the target, one point for each voxel.
+    pub clouds: &'a [GicpCloud; 2],
+    pub voxel: f64,
     /// The source's points that are fitted.
     pub sample: &'a [[f64; 3]],
     pub sensors: BothSensors<'a>,
@@ -93,7 +99,7 @@ impl Judge<'_> {
         let mut judged = Judgement {
             better: alternatives.iter().find(is_better).map(|rival| rival.T_target_source),
             doubts: Vec::new(),
-            free_directions: rivals.free_directions(&best, &found.points, &found.normals),
+            free_directions: self.free_directions(found),
             alternatives,
             explained: best.share(),
             free_space,
@@ -108,6 +114,14 @@ impl Judge<'_> {
         judged.doubts.extend(doubt);
         self.doubt(found, support, &mut judged);
         judged
+    }
+
+    /// Motions that the overlap does not determine.
+    fn free_directions(&self, found: &PointToSurface) -> Vec<FreeDirection> {
+        let RivalSettings { weak, .. } = self.settings.rivals;
+        let [source, target] = self.clouds;
+        let reach = NORMAL_REACH * self.voxel;
+        found.free_directions([source, target], reach, weak, self.settings.rivals.held())
     }
 
     /// The share that a transform explains of other points than the sample, as of its mirror image, after it is fitted to

@@ -131,10 +131,16 @@ fn registered(
         .viewpoints()
         .map(|viewpoints| [0, 1].map(|k| Faced::new(&clouds[k], viewpoints[k], &settings.faces)));
     let trial = Trial {
-        judge: Judge { surface: &surface, sample: &sample, sensors, radius, settings },
-        clouds: &clouds,
+        judge: Judge {
+            surface: &surface,
+            clouds: &clouds,
+            voxel,
+            sample: &sample,
+            sensors,
+            radius,
+            settings,
+        },
         sides,
-        voxel,
         matches: matches.as_ref(),
         monitor,
     };

@@ -46,8 +46,7 @@ pub struct RegistrationSettings {
     pub min_voxels: usize,
     /// When another transform explains as much.
     pub rivals: RivalSettings,
-    /// How rivals, and sources of another size, are fitted: from farther away than a transform that was refined, and
-    /// than a push (8 voxels), so that what is pushed off the surface is seen to be off it.
+    /// How rivals, and sources of another size, are fitted: from farther away than a transform that was refined.
     pub rival_fit: PointToSurfaceSettings,
     /// When points lie where a sensor looked through.
     pub free_space: FreeSpaceSettings,

@@ -2,7 +2,7 @@
 
 use super::face_search::{FaceSearch, Faced, SAME_SIDE};
 use super::judgement::{Faces, Judge, Judgement, Support};
-use crate::alignment::{Correspondences, Doubt, GicpCloud, GicpSettings, PointToSurface, gicp};
+use crate::alignment::{Correspondences, Doubt, GicpSettings, PointToSurface, gicp};
 use crate::geometry::RigidTransform;
 use crate::{Error, Monitor};
 use nalgebra::Vector3;
@@ -10,11 +10,8 @@ use nalgebra::Vector3;
 /// Two scans about their middles, with all by which transforms are refined and judged.
 pub(super) struct Trial<'a> {
     pub judge: Judge<'a>,
-    /// The source and the target, one point for each voxel.
-    pub clouds: &'a [GicpCloud; 2],
-    /// The same with the sides from which they were seen, where both viewpoints are known.
+    /// The source and the target with the sides from which they were seen, where both viewpoints are known.
     pub sides: Option<[Faced<'a>; 2]>,
-    pub voxel: f64,
     /// `None` where a start was given.
     pub matches: Option<&'a Correspondences>,
     pub monitor: &'a Monitor,
@@ -53,7 +50,7 @@ impl Trial<'_> {
             source,
             target,
             sensors: &self.judge.sensors,
-            voxel: self.voxel,
+            voxel: self.judge.voxel,
             distance: settings.rivals.distance * self.judge.radius,
             settings: settings.faces,
         };
@@ -112,7 +109,7 @@ impl Trial<'_> {
     /// Fits the points of the sample to the surface, but for those that see the other side of it.
     fn aligned(&self, start: RigidTransform) -> Option<PointToSurface> {
         let Judge { surface, sample, settings, .. } = self.judge;
-        let near = settings.point_to_surface.max_distance * self.voxel;
+        let near = settings.point_to_surface.max_distance * self.judge.voxel;
         let kept: Vec<[f64; 3]> =
             sample.iter().filter(|point| !self.sees_other_side(**point, &start, near)).copied().collect();
         let mut found = surface.align(&kept, start, &settings.point_to_surface)?;
@@ -124,8 +121,8 @@ impl Trial<'_> {
     /// correspondences stays as it was proposed.
     fn refined(&self, proposed: RigidTransform) -> RigidTransform {
         let settings = self.judge.settings;
-        let [source, target] = self.clouds;
-        let near = settings.gicp_distances[0] * self.voxel;
+        let [source, target] = self.judge.clouds;
+        let near = settings.gicp_distances[0] * self.judge.voxel;
         // Where sides are not known, all points stay.
         let kept =
             self.sides.as_ref().map(|_| source.some(|point| !self.sees_other_side(point, &proposed, near)));
@@ -134,10 +131,10 @@ impl Trial<'_> {
         for distance in settings.gicp_distances {
             let [rotation_epsilon, translation] = settings.gicp_epsilon;
             let round = GicpSettings {
-                max_correspondence_distance: distance * self.voxel,
+                max_correspondence_distance: distance * self.judge.voxel,
                 max_iterations: settings.gicp_iterations,
                 rotation_epsilon,
-                translation_epsilon: translation * self.voxel,
+                translation_epsilon: translation * self.judge.voxel,
             };
             let found = gicp(target, source, transform, &round);
             if found.inliers == 0 {

@@ -1,0 +1,136 @@
+//! Whether a surface holds a motion, or only the errors of its normals do.
+//!
+//! Normals err, and a scan that slides along a smooth corridor leaves thousands of slightly wrong planes: to least squares
+//! that looks like a surface that holds it. Two normals of one place that err independently of each other, of two scans
+//! or of two halves of a neighbourhood, tell both apart: what the square of one says about a motion is too much by its
+//! error; the product of both is right in the mean (an instrumental variable: Fuller, Measurement Error Models, 1987,
+//! section 1.4).
+
+use super::gicp_cloud::{GicpCloud, GicpTarget};
+use super::observability::{FreeDirection, Motions, UNOBSERVABLE};
+use super::point_to_surface::PointToSurface;
+use nalgebra::Vector3;
+
+/// From when on a surface holds a motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct HeldLimits {
+    /// Share of what each of both normals says about a motion that both say alike.
+    pub share: f64,
+    /// What both say alike, in standard errors.
+    pub deviations: f64,
+}
+
+/// Places of a surface, each with two unit normals that err independently of each other, on the same side.
+pub(crate) struct IndependentNormals(Vec<([f64; 3], [Vector3<f64>; 2])>);
+
+impl IndependentNormals {
+    /// Takes places and both normals of each, of which the sides are open.
+    pub fn new(places: impl Iterator<Item = ([f64; 3], [[f64; 3]; 2])>) -> Self {
+        let on_one_side = |(point, normals): ([f64; 3], [[f64; 3]; 2])| {
+            let [one, other] = normals.map(Vector3::from);
+            (point, [one, other * one.dot(&other).signum()])
+        };
+        Self(places.map(on_one_side).collect())
+    }
+
+    /// Whether the surface holds points that move with a velocity: what both normals say alike is no chance, and so large
+    /// a share of what each says that the surface says more than the errors do.
+    pub fn hold(&self, velocity: impl Fn(&[f64; 3]) -> Vector3<f64>, limits: HeldLimits) -> bool {
+        let (mut said, mut alike, mut variance) = (0.0, 0.0, 0.0);
+        for (point, [one, other]) in &self.0 {
+            let velocity = velocity(point);
+            let [one, other] = [one, other].map(|normal| normal.dot(&velocity));
+            // The mean of this product is the square of what the true normal says; that of each square is larger.
+            let product = one * other;
+            alike += product;
+            variance += product * product;
+            said += 0.5 * (one * one + other * other);
+        }
+        alike > limits.share * said && alike > limits.deviations * f64::sqrt(variance)
+    }
+}
+
+impl PointToSurface {
+    /// Motions that the inliers do not determine, in the target: along some the surface slides over itself, along others,
+    /// over which it slides a share of `weak` of its path at most, only errors of normals would hold it. Normals are
+    /// those of the voxels of source and target, within a reach.
+    pub fn free_directions(
+        &self,
+        [source, target]: [&GicpCloud; 2],
+        reach: f64,
+        weak: f64,
+        limits: HeldLimits,
+    ) -> Vec<FreeDirection> {
+        let motions = Motions::new(&self.points, &self.normals);
+        let to_source = self.T_target_source.inverse();
+        let normals_at = |point: &[f64; 3]| {
+            let ours = source.surface(source.nearest(to_source.transform_point(*point), reach)?).1;
+            let theirs = target.surface(target.nearest(*point, reach)?).1;
+            Some((*point, [self.T_target_source.transform_vector(ours), theirs]))
+        };
+        let both = IndependentNormals::new(self.points.iter().filter_map(normals_at));
+        motions.named(|sliding, number| {
+            sliding <= UNOBSERVABLE
+                || sliding <= weak && !both.hold(|point| motions.velocity(number, point), limits)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::point_to_surface::{PointToSurfaceSettings, TargetSurface};
+    use super::*;
+    use crate::geometry::RigidTransform;
+    use crate::random::uniform;
+
+    const LIMITS: HeldLimits = HeldLimits { share: 0.5, deviations: 3.0 };
+
+    /// The motions of a noisy square of 60 x 60, with a step of a height in its middle, that two scans of it leave open.
+    fn free(noise: f64, height: f64) -> Vec<FreeDirection> {
+        let scan = |number: usize| {
+            let at = |i: usize, k: u64| uniform(i + 100_000 * number, k) - 0.5;
+            let floor = (0..3600).map(|i| {
+                let x = 60.0 * at(i, 0);
+                [x, 60.0 * at(i, 1), noise * at(i, 2) + if x > 0.0 { height } else { 0.0 }]
+            });
+            let riser = (0..(60.0 * height) as usize)
+                .map(|i| [noise * at(i, 3), 60.0 * at(i, 4), height * (0.5 + at(i, 5))]);
+            floor.chain(riser).collect::<Vec<[f64; 3]>>()
+        };
+        let [source, target] = [scan(0), scan(1)];
+        let surface = TargetSurface::new(target.clone(), 1.0);
+        let settings = PointToSurfaceSettings::default();
+        let found = surface.align(&source, RigidTransform::identity(), &settings).expect("it was at the end");
+        let clouds = [source, target].map(GicpCloud::new);
+        found.free_directions([&clouds[0], &clouds[1]], 2.0, 0.25, LIMITS)
+    }
+
+    #[test]
+    fn a_noisy_square_slides_and_turns_over_itself() {
+        for noise in [0.1, 0.5] {
+            assert_eq!(free(noise, 0.0).len(), 3, "noise {noise}");
+        }
+    }
+
+    #[test]
+    fn a_step_leaves_the_motion_along_it_only() {
+        for noise in [0.1, 0.5] {
+            let found = free(noise, 8.0);
+            let [FreeDirection::Translation { axis }] = found[..] else { panic!("{noise}: {found:?}") };
+            assert!(axis[1].abs() > 0.99, "{noise}: {axis:?}");
+        }
+    }
+
+    #[test]
+    fn sides_of_normals_are_of_no_account() {
+        let flipped = |sign: f64| {
+            let places = (0..500).map(|i| {
+                let x = f64::from(i) / 500.0 - 0.5;
+                ([x, 0.0, 0.0], [[0.6, 0.0, 0.8], [0.6 * sign, 0.0, 0.8 * sign]])
+            });
+            IndependentNormals::new(places).hold(|_| Vector3::x(), LIMITS)
+        };
+        assert!(flipped(1.0) && flipped(-1.0));
+        assert!(!IndependentNormals::new(std::iter::empty()).hold(|_| Vector3::x(), LIMITS));
+    }
+}
