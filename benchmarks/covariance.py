@@ -45,6 +45,8 @@ PLACES: dict[str, tuple[Callable[[int], simulate.Scene], float]] = {
 """Scenes, and metres between two scans of a pair at most."""
 WRONG = 0.25
 """Radii of a patch from which on a pose is wrong and not only inaccurate."""
+WRONG_TURN = np.radians(5.0)
+"""The same of its rotation: halls are nearly the same after half a turn about their middles."""
 SCANS = 12
 """Of a sequence."""
 
@@ -100,7 +102,11 @@ def of_registration(found: surfsig.Registration, truth: Array | None) -> tuple[f
     to_center = geometry.from_translation(found.center)
     off = geometry.inverse(to_center) @ truth @ geometry.inverse(found.T_target_source) @ to_center
     said = float(np.sqrt(np.diag(found.covariance)[3:].sum()))
-    if not np.isfinite(off).all() or np.linalg.norm(off[:3, 3]) > WRONG * found.radius:
+    if (
+        not np.isfinite(off).all()
+        or np.linalg.norm(off[:3, 3]) > WRONG * found.radius
+        or geometry.rotation_angle(off) > WRONG_TURN
+    ):
         return (float("nan"), float("nan"), float("nan"))
     twist = geometry.log_pose(off)
     return share_of_covariance(twist, found.covariance), float(np.linalg.norm(twist[3:])), said

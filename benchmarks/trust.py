@@ -27,6 +27,8 @@ COMMAND = "python benchmarks/trust.py --write"
 Array = NDArray[np.float64]
 DEGREES, SHARE = 2.0, 0.01
 """A pose is right within so many degrees, and so large a share of the target's extent."""
+CLEAR = 0.2
+"""Metres from a sensor within which nothing is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +49,24 @@ def _lidar(lines: int) -> simulate.Lidar:
 def _two_places(
     scene: simulate.Scene, sensor: simulate.Lidar | simulate.DepthCamera, seed: int, **how: float
 ) -> Pair:
-    """Scan from two places: `apart` metres, any yaw for lidars, within `turned` radians for cameras."""
+    """Scan from two places: `apart` metres, any yaw for lidars, within `turned` radians for cameras.
+
+    Where a sensor would stand in something, another pair is drawn.
+    """
     rng = np.random.default_rng([7, seed])
+    while True:
+        pair = _drawn(scene, sensor, seed, rng, **how)
+        if all(np.linalg.norm(cloud.points, axis=1).min() > CLEAR for cloud in (pair.source, pair.target)):
+            return pair
+
+
+def _drawn(
+    scene: simulate.Scene,
+    sensor: simulate.Lidar | simulate.DepthCamera,
+    seed: int,
+    rng: np.random.Generator,
+    **how: float,
+) -> Pair:
     height = how.get("height", 1.3)
     step = rng.uniform(0.3, 1.0) * how.get("apart", 1.0)
     about = how.get("heading", rng.uniform(0.0, 2.0 * np.pi))

@@ -114,6 +114,7 @@ from surfsig.tiles import (
     open,
 )
 from surfsig.units import unit_mismatch
+from surfsig.visibility import estimate_viewpoint
 
 __all__ = [
     "INSTRUCTION_SET",
@@ -175,6 +176,7 @@ __all__ = [
     "deskew",
     "downsample",
     "estimate_odometry",
+    "estimate_viewpoint",
     "extract",
     "extract_field_signatures",
     "extract_radii",

@@ -36,6 +36,7 @@ __all__ = [
     "coordinate_steps",
     "different_places",
     "distance_to_nearest",
+    "estimated_viewpoint",
     "extract",
     "field_keypoints",
     "field_signatures",
@@ -620,6 +621,7 @@ def hidden_from(
     spacing: float,
 ) -> NDArray[np.bool_]: ...
 def measured_from_origin(points: NDArray[np.float64], spacing: float) -> bool: ...
+def estimated_viewpoint(points: NDArray[np.float64]) -> list[float] | None: ...
 def free_directions(
     points: NDArray[np.float64], normals: NDArray[np.float64]
 ) -> list[tuple[Literal["rotation", "translation"], list[float] | None, list[float] | None]]: ...

@@ -1,4 +1,4 @@
-"""What can have been seen from where: whether a cloud's viewpoint can be true."""
+"""What can have been seen from where: whether a viewpoint can be true, and from where a scan was measured."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
 from surfsig.point_cloud import PointCloud
@@ -23,6 +23,39 @@ def hidden_from(direction: Array, places: Array, points: Array, spacing: float) 
     across = np.linalg.svd(direction[None])[2][1:]
     places, points = (np.ascontiguousarray(array, np.float64) for array in (places, points))
     return _surfsig.hidden_from(direction.tolist(), across.tolist(), places, points, spacing)
+
+
+def estimate_viewpoint(cloud: PointCloud | ArrayLike) -> Array | None:
+    """Tell by the density of a scan's points from where it was measured.
+
+    A sensor sends its rays evenly over directions: a surface at distance r, whose normal makes the angle a
+    with the ray, holds points for an area as cos(a) / r^2. That fits for the true viewpoint only. `register`
+    and `find_instances` do so themselves where nothing says from where a scan was seen.
+
+    Parameters
+    ----------
+    cloud
+        A scan from one place, all of its points or some at random; `PointCloud`, an array (n, 3), or any
+        other that `PointCloud.of` takes. Viewpoint and normals that it has are not used.
+
+    Returns
+    -------
+    (3,), in the cloud's coordinates and unit: within some hundredths of the scan's size of the true one, or
+    in its direction where that is many sizes away. None where the density does not tell, as of scans that
+    were thinned evenly or fused of several, and where not all could be seen from there.
+
+    Examples
+    --------
+    >>> import surfsig
+    >>> scan = surfsig.simulate.scan(surfsig.simulate.room(5), surfsig.simulate.Lidar(noise=0.01), seed=1)
+    >>> viewpoint = surfsig.estimate_viewpoint(scan)
+    >>> bool(abs(viewpoint - scan.viewpoint).max() < 0.1)
+    True
+    """
+    whole = PointCloud.of(cloud)
+    offsets = whole.offsets[np.isfinite(whole.offsets).all(axis=1)].astype(np.float64)
+    found = _surfsig.estimated_viewpoint(np.ascontiguousarray(offsets))
+    return None if found is None else np.asarray(whole.origin + found)
 
 
 def without_false_viewpoint(cloud: PointCloud, source: str) -> PointCloud:

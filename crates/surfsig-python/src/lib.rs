@@ -89,7 +89,7 @@ mod _surfsig {
     #[pymodule_export]
     use crate::surfaces::{added_sums, find_surfaces, join_surface_pieces, surface_of_sums, surface_sums};
     #[pymodule_export]
-    use crate::visibility::{hidden_from, measured_from_origin};
+    use crate::visibility::{estimated_viewpoint, hidden_from, measured_from_origin};
 
     use pyo3::prelude::*;
     use pyo3::types::IntoPyDict;

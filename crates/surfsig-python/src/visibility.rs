@@ -30,3 +30,10 @@ pub fn measured_from_origin(
     let points = rows::<f64, 3>(&points)?;
     Ok(py.detach(|| surfsig::measured_from_origin(points, spacing)))
 }
+
+/// From where a sensor measured points (n, 3), or None; see `surfsig.visibility`.
+#[pyfunction]
+pub fn estimated_viewpoint(py: Python<'_>, points: PyReadonlyArray2<'_, f64>) -> PyResult<Option<[f64; 3]>> {
+    let points = rows::<f64, 3>(&points)?;
+    Ok(py.detach(|| surfsig::estimated_viewpoint(points)))
+}

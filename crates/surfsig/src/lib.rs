@@ -133,6 +133,7 @@ pub use surfaces::{
 };
 pub use threads::with_threads;
 pub use visibility::{
-    RangeImageSettings, SphericalRangeImage, Visibility, all_seen_from, hidden_from, measured_from_origin,
+    RangeImageSettings, SphericalRangeImage, Visibility, all_seen_from, estimated_viewpoint, hidden_from,
+    measured_from_origin,
 };
 pub use voxels::voxel_means;

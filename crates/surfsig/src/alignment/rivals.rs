@@ -169,6 +169,11 @@ impl<S: FittedSurface> Rivals<'_, S> {
         Explained::new(self.closeness(&self.T_target_source), self.source)
     }
 
+    /// Whether another transform explains so much less that it is no chance.
+    pub fn refutes(&self, other: &RigidTransform) -> bool {
+        self.is_refuted(&self.explained(), &self.closeness(other), self.settings.deficit)
+    }
+
     fn closeness(&self, transform: &RigidTransform) -> Closeness {
         self.surface.closeness(&transform.transform_points(self.source))
     }

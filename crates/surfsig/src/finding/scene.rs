@@ -7,7 +7,7 @@ use crate::alignment::OrientedSurface;
 use crate::depth_image::{DepthImage, SurfacePlace};
 use crate::scan::CenteredScan;
 use crate::spacing::point_spacing;
-use crate::visibility::all_seen_from;
+use crate::visibility::{all_seen_from, estimated_viewpoint};
 use crate::voxels::Voxels;
 use crate::{Error, FieldPlaces, Monitor};
 use nalgebra::Vector3;
@@ -65,7 +65,8 @@ pub(super) struct Scene<'a> {
 
 impl<'a> Scene<'a> {
     /// `radius` is that of patches over which the surface's side is told where the sensor does not. Without a viewpoint
-    /// the origin of the scan's coordinates is one, where all points can have been seen from there.
+    /// the origin of the scan's coordinates is one, where all points can have been seen from there; else it is told by
+    /// their density, if that can be.
     pub fn new(
         scan: CenteredScan,
         radius: f64,
@@ -73,8 +74,10 @@ impl<'a> Scene<'a> {
         monitor: &'a Monitor,
     ) -> Result<Self, Error> {
         let spacing = point_spacing(&scan.points);
+        let is_unknown = !scan.scan().is_oriented();
         let viewpoint = scan.viewpoint.unwrap_or_else(|| scan.center.map(|x| -x));
         let viewpoint = all_seen_from(viewpoint, &scan.points, spacing).then_some(viewpoint);
+        let viewpoint = viewpoint.or_else(|| is_unknown.then(|| estimated_viewpoint(&scan.points)).flatten());
         let scan = CenteredScan { viewpoint: viewpoint.filter(|_| scan.directions.is_none()), ..scan };
         let is_oriented = scan.scan().is_oriented();
         let scan = if is_oriented { scan } else { oriented_outwards(scan, radius, monitor)? };

@@ -125,10 +125,4 @@ impl FaceSearch<'_> {
         let largest = settings.rival_share * best.score;
         best.score >= settings.certain_score && others.first().is_none_or(|other| other.score <= largest)
     }
-
-    /// Whether the source's mirror image explains less than the first of the candidates.
-    pub fn is_of_one_hand(&self, candidates: &[FaceCandidate]) -> bool {
-        let [best, ..] = candidates else { return false };
-        self.candidates(true).first().is_none_or(|other| other.score < best.score)
-    }
 }

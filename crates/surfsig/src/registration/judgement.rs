@@ -28,18 +28,19 @@ pub(super) struct Judge<'a> {
 
 /// What speaks for a transform.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Support {
+pub(super) struct Support<'a> {
     /// The matches that agree; `None` where a start was given.
     pub inliers: Option<usize>,
-    pub faces: Faces,
+    /// What the search by faces says; `None` where there was none.
+    pub faces: Option<Faces<'a>>,
 }
 
-/// What the search by faces says of a transform; nothing where there was none.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Faces {
-    /// Whether the transforms that take faces onto faces, as far as both sensors allow them, are among the others that
-    /// were proposed, and explain more than those of the source's mirror image.
-    pub is_searched: bool,
+/// What the search by faces says of a transform: those that take faces onto faces, as far as both sensors allow them,
+/// are among the others that were proposed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Faces<'a> {
+    /// Transforms that take the faces of the source's mirror image onto faces, as far as both sensors allow them.
+    pub mirrored: &'a [RigidTransform],
     /// Whether none of these explains nearly as much, before it is refined.
     pub is_exclusive: bool,
 }
@@ -59,7 +60,12 @@ pub(super) struct Judgement {
 
 impl Judge<'_> {
     /// Judges a transform beside others that were proposed.
-    pub fn judged(&self, found: &PointToSurface, proposed: &[RigidTransform], support: Support) -> Judgement {
+    pub fn judged(
+        &self,
+        found: &PointToSurface,
+        proposed: &[RigidTransform],
+        support: Support<'_>,
+    ) -> Judgement {
         let settings = self.settings;
         let some = self.some(self.sample);
         let is_hidden = |point: [f64; 3]| self.sensors.is_hidden_from_target(point);
@@ -112,6 +118,12 @@ impl Judge<'_> {
             (judged.scale, judged.scale_standard_error) = (scale.scale, scale.standard_error);
         }
         judged.doubts.extend(doubt);
+        // Where the source's mirror image explains more, faces prove nothing. Where it explains as much, as in corridors
+        // whose ceilings are like their floors, the mirror image is a scan of the same place.
+        let is_of_one_hand = |faces: &Faces<'_>| {
+            !faces.mirrored.iter().any(|&mirrored| self.is_refuted_by_mirror(found, mirrored))
+        };
+        let support = Support { faces: support.faces.filter(is_of_one_hand), ..support };
         self.doubt(found, support, &mut judged);
         judged
     }
@@ -124,14 +136,13 @@ impl Judge<'_> {
         found.free_directions([source, target], reach, weak, self.settings.rivals.held())
     }
 
-    /// The share that a transform explains of other points than the sample, as of its mirror image, after it is fitted to
-    /// them; 0 where it does not bring them to the surface.
-    pub fn explained_of(&self, found: &PointToSurface, points: &[[f64; 3]], start: RigidTransform) -> f64 {
-        let some = self.some(points);
+    /// Whether a transform of the source's mirror image explains more than the one that was found, by more than chance.
+    pub fn is_refuted_by_mirror(&self, found: &PointToSurface, mirrored: RigidTransform) -> bool {
+        let some = self.some(self.sample);
         let is_hidden = |point: [f64; 3]| self.sensors.is_hidden_from_target(point);
-        let fitted = self.surface.align(&some, start, &self.settings.rival_fit);
-        fitted.map_or(0.0, |fitted| {
-            self.rivals(found, fitted.T_target_source, &some, &is_hidden).explained().share()
+        let fitted = self.surface.align(&some, mirrored, &self.settings.rival_fit);
+        fitted.is_some_and(|fitted| {
+            self.rivals(found, fitted.T_target_source, &some, &is_hidden).refutes(&found.T_target_source)
         })
     }
 
@@ -158,15 +169,16 @@ impl Judge<'_> {
         Rivals { surface, source, T_target_source, radius: self.radius, settings: settings.rivals }
     }
 
-    fn doubt(&self, found: &PointToSurface, support: Support, judged: &mut Judgement) {
+    fn doubt(&self, found: &PointToSurface, support: Support<'_>, judged: &mut Judgement) {
         let settings = self.settings;
         let doubts = &mut judged.doubts;
         // NaN is no free space that is known.
         let is_freer_than = |share: f64| judged.free_space <= share;
         let explains_much = judged.explained >= settings.certain_explained;
-        let is_proved_by_faces = support.faces.is_exclusive
-            && is_freer_than(settings.free_space.certain_share)
-            || support.faces.is_searched && explains_much && is_freer_than(settings.faces.certain_free_space);
+        let is_proved_by_faces = support.faces.is_some_and(|faces| {
+            faces.is_exclusive && is_freer_than(settings.free_space.certain_share)
+                || explains_much && is_freer_than(settings.faces.certain_free_space)
+        });
         let needed = if is_proved_by_faces {
             0
         } else if explains_much && is_freer_than(settings.free_space.certain_share) {

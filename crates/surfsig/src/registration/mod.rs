@@ -28,8 +28,10 @@ use crate::field::{KeypointOptions, keypoints_within, match_fields};
 use crate::geometry::RigidTransform;
 use crate::orientation::directions_within;
 use crate::scan::CenteredScan;
+use crate::visibility::estimated_viewpoint;
 use crate::voxels::voxel_means;
 use crate::{Error, FieldOptions, FieldPlaces, Monitor, PointCloud, Radius, Scan, with_threads};
+use nalgebra::{Matrix3, Vector3};
 
 /// Steps of which [`Monitor::done`] counts each.
 pub const REGISTRATION_STEPS: usize = 5;
@@ -76,9 +78,17 @@ pub fn register(
 ) -> Result<Registration, Error> {
     settings.radius.map(Radius::new).transpose()?;
     with_threads(settings.threads, || {
-        let scans = [CenteredScan::new(source), CenteredScan::new(target)];
+        let scans = [source, target].map(oriented);
         registered(&scans[0], &scans[1], start, settings, monitor)
     })?
+}
+
+/// A scan about its middle; where nothing says from where it was seen, its points may ([`estimated_viewpoint`]).
+fn oriented(scan: &Scan<'_>) -> CenteredScan {
+    let centered = CenteredScan::new(scan);
+    let viewpoint =
+        if scan.is_oriented() { centered.viewpoint } else { estimated_viewpoint(&centered.points) };
+    CenteredScan { viewpoint, ..centered }
 }
 
 fn registered(
@@ -144,17 +154,16 @@ fn registered(
         matches: matches.as_ref(),
         monitor,
     };
-    let Some(Tried { found, mut judged, support }) = trial.best(&proposals)? else {
+    let Some(Tried { found, mut judged, inliers, is_by_faces }) = trial.best(&proposals)? else {
         return Ok(Registration::nothing(radius, count));
     };
     monitor.add(1);
-    if let (true, false, Some(own)) = (judged.doubts.is_empty(), support.faces.is_searched, support.inliers) {
+    if let (true, false, Some(own)) = (judged.doubts.is_empty(), is_by_faces, inliers) {
         let agreement = own as f64 / (count as f64 * found.overlap);
         if agreement < settings.doubted_agreement {
-            let (inliers, start) = mirrored(source, target, patch, settings, monitor)?;
-            let image: Vec<[f64; 3]> = sample.iter().map(|&[x, y, z]| [-x, y, z]).collect();
+            let (inliers, transform) = mirrored(source, target, patch, settings, monitor)?;
             if inliers as f64 > settings.mirrored_inliers * own as f64
-                && trial.judge.explained_of(&found, &image, start) > judged.explained
+                && trial.judge.is_refuted_by_mirror(&found, transform)
             {
                 judged.doubts.push(Doubt::Mirrored { inliers });
             }
@@ -177,7 +186,7 @@ fn registered(
         free_directions: free_directions.iter().map(|direction| direction.transformed(&to_target)).collect(),
         alternatives: alternatives.collect(),
         matches: count,
-        inliers: support.inliers.unwrap_or(0),
+        inliers: inliers.unwrap_or(0),
         overlap: found.overlap,
         explained: judged.explained,
         free_space: judged.free_space,
@@ -217,7 +226,7 @@ pub fn free_space_share(
 ) -> Result<f64, Error> {
     settings.radius.map(Radius::new).transpose()?;
     with_threads(settings.threads, || {
-        let scans = [CenteredScan::new(source), CenteredScan::new(target)];
+        let scans = [source, target].map(oriented);
         let size = scans[0].size().min(scans[1].size());
         let voxel = settings.radius.unwrap_or(settings.radius_share * size) / settings.voxels_per_radius;
         if voxel.is_nan() || voxel <= 0.0 {
@@ -232,7 +241,7 @@ pub fn free_space_share(
     })
 }
 
-/// How many matches of the source's mirror image agree with one transform, and this.
+/// How many matches of the source's mirror image agree with one transform, and this, which mirrors the source.
 fn mirrored(
     source: &CenteredScan,
     target: &CenteredScan,
@@ -244,7 +253,8 @@ fn mirrored(
     let mirrored = thinned(source).mirrored();
     let matches = matched(&mirrored, &thinned(target), patch, settings, &monitor.apart())?;
     let agreed = matches.agreed_transform();
-    Ok((matches.inlier_count(&agreed), agreed))
+    let mirror = Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
+    Ok((matches.inlier_count(&agreed), RigidTransform { rotation: agreed.rotation * mirror, ..agreed }))
 }
 
 /// Matches keypoints; where it is not known for both scans from where they were seen, both sides of the source's

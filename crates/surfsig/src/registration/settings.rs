@@ -66,7 +66,8 @@ pub struct RegistrationSettings {
     /// Share that such a transform explains, at least: waves that come again explain a third of the wrong ones.
     pub certain_explained: f64,
     /// Matches that agree, per match and overlap, below which it is tried whether the source's mirror image fits better:
-    /// 0.2 to 0.3 of mirrored rooms, 0.33 and more of right ones. It must also explain more of the source's points.
+    /// 0.2 to 0.3 of mirrored rooms, 0.33 and more of right ones. It must also explain more of the source's points than chance
+    /// does: halls are nearly their own mirror images.
     pub doubted_agreement: f64,
     /// How many times as many matches of the mirror image must agree.
     pub mirrored_inliers: f64,

@@ -1,6 +1,6 @@
 //! Which of the transforms that were proposed is the best one, and what its tests say.
 
-use super::face_search::{FaceSearch, Faced, SAME_SIDE};
+use super::face_search::{FaceCandidate, FaceSearch, Faced, SAME_SIDE};
 use super::judgement::{Faces, Judge, Judgement, Support};
 use crate::alignment::{Correspondences, Doubt, GicpSettings, PointToSurface, gicp};
 use crate::geometry::RigidTransform;
@@ -21,7 +21,10 @@ pub(super) struct Trial<'a> {
 pub(super) struct Tried {
     pub found: PointToSurface,
     pub judged: Judgement,
-    pub support: Support,
+    /// The matches that agree; `None` where a start was given.
+    pub inliers: Option<usize>,
+    /// Whether transforms by faces were among those that were proposed.
+    pub is_by_faces: bool,
 }
 
 impl Tried {
@@ -34,7 +37,7 @@ impl Trial<'_> {
     /// The best of proposed transforms; where matches do not prove it, or a sensor refutes it, also of those by faces.
     /// `None` where none brings the scans together.
     pub fn best(&self, proposals: &[RigidTransform]) -> Result<Option<Tried>, Error> {
-        let by_matches = self.tried(proposals, Faces::default())?;
+        let by_matches = self.tried(proposals, None)?;
         let is_refuted = by_matches
             .as_ref()
             .is_none_or(|tried| tried.is_doubted(|doubt| matches!(doubt, Doubt::FreeSpace { .. })));
@@ -58,11 +61,13 @@ impl Trial<'_> {
         if candidates.is_empty() {
             return Ok(by_matches);
         }
-        let is_searched = search.is_of_one_hand(&candidates);
-        let faces = Faces { is_searched, is_exclusive: is_searched && search.is_exclusive(&candidates) };
-        let by_candidates = candidates.iter().map(|candidate| candidate.T_target_source);
-        let transforms: Vec<RigidTransform> = by_candidates.chain(proposals.iter().copied()).collect();
-        let by_faces = self.tried(&transforms, faces)?;
+        let transforms_of = |candidates: &[FaceCandidate]| -> Vec<RigidTransform> {
+            candidates.iter().map(|candidate| candidate.T_target_source).collect()
+        };
+        let mirrored = transforms_of(&search.candidates(true));
+        let faces = Faces { mirrored: &mirrored, is_exclusive: search.is_exclusive(&candidates) };
+        let transforms = [&transforms_of(&candidates), proposals].concat();
+        let by_faces = self.tried(&transforms, Some(faces))?;
         let is_better = |by_faces: &Tried| {
             by_faces.judged.doubts.is_empty()
                 || is_refuted && by_faces.judged.free_space <= settings.free_space.doubted_share
@@ -71,7 +76,7 @@ impl Trial<'_> {
     }
 
     /// The first transform, refined and judged beside the others, or another one that is better.
-    fn tried(&self, proposals: &[RigidTransform], faces: Faces) -> Result<Option<Tried>, Error> {
+    fn tried(&self, proposals: &[RigidTransform], faces: Option<Faces<'_>>) -> Result<Option<Tried>, Error> {
         let Some((first, others)) = proposals.split_first() else { return Ok(None) };
         self.monitor.check()?;
         let Judge { sample, settings, radius, .. } = self.judge;
@@ -79,19 +84,20 @@ impl Trial<'_> {
         let Some(found) = align(self.refined(*first)) else { return Ok(None) };
         self.monitor.check()?;
         let moved = found.T_target_source.displacement_from(first, sample.iter().copied());
-        let support = |found: &PointToSurface, is_exclusive: bool| Support {
+        let is_by_faces = faces.is_some();
+        let support = |found: &PointToSurface, is_first: bool| Support {
             inliers: self.matches.map(|matches| matches.inlier_count(&found.T_target_source)),
-            faces: Faces { is_exclusive, ..faces },
+            faces: faces.map(|faces| Faces { is_exclusive: is_first && faces.is_exclusive, ..faces }),
         };
-        let own = support(&found, faces.is_exclusive && moved <= settings.rivals.distance * radius);
+        let own = support(&found, moved <= settings.rivals.distance * radius);
         let judged = self.judge.judged(&found, others, own);
         let Some(better) = judged.better.and_then(align) else {
-            return Ok(Some(Tried { found, judged, support: own }));
+            return Ok(Some(Tried { found, judged, inliers: own.inliers, is_by_faces }));
         };
         let others: Vec<RigidTransform> = others.iter().copied().chain([found.T_target_source]).collect();
         let own = support(&better, false);
         let judged = self.judge.judged(&better, &others, own);
-        Ok(Some(Tried { found: better, judged, support: own }))
+        Ok(Some(Tried { found: better, judged, inliers: own.inliers, is_by_faces }))
     }
 
     /// Whether the nearest of the target's points shows the other side of the surface: scans from two rooms see both
