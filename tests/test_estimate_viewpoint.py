@@ -47,7 +47,7 @@ def test_of_simulated_sensors(
 def test_of_some_of_the_points_in_any_order() -> None:
     scan = scanned(simulate.Lidar(lines=32, elevation=(-25.0, 25.0), noise=0.01), 63)
     some = np.random.default_rng(5).permutation(len(scan))[: len(scan) // 4]
-    assert error(PointCloud(scan.points[some])) < 0.1
+    assert error(PointCloud(scan.points[some])) < 0.25
 
 
 def test_at_large_coordinates() -> None:

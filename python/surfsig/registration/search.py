@@ -40,7 +40,8 @@ def register(
     Keypoints of both are matched by their field signatures; each match proposes a whole transform, and the
     one that most agree with is refined, first by distributions (generalised ICP: Segal and others, 2009),
     then by the distances of points from the surface, which tell how sure it is. Where a viewpoint is not
-    known, both sides of its surface are tried.
+    known, it is told by the density of the points (`estimate_viewpoint`), or both sides of the surface are
+    tried.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@
 //! come closer towards its poles, pixels of a camera towards its rims. So the logarithm may change with the direction `u`
 //! as `u^T A u`, the lowest even function of it.
 
-use super::possible_viewpoint::all_seen_from;
+use super::possible_viewpoint::{HIDDEN_IN_ROWS, hidden_share_from};
 use crate::kd_tree::KdTree;
 use crate::random::some_of;
 use crate::statistics::median;
@@ -14,8 +14,10 @@ use crate::voxels::voxel_means;
 use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
-/// Points at which the density is taken, at most: with 1,500 the viewpoints of simulated scans are found to 3 cm.
-const SAMPLE: usize = 1500;
+/// Points at which the density is taken, at most: the errors of their densities are evened out by the fit.
+const SAMPLE: usize = 4000;
+/// Of these, one in so many is fitted from all starts.
+const COARSE_STEP: usize = 8;
 /// Points without which nothing is said.
 const LEAST: usize = 200;
 /// Nearest points from which density and normal are taken: their number errs by a fifth, which the fit evens out.
@@ -31,10 +33,14 @@ const GRAZING: f64 = 0.05;
 /// Scale of the robust loss (Cauchy's), in the logarithm of the density: what the count of neighbours errs by.
 const LOSS: f64 = 0.2;
 /// Median error of the logarithm that is left, over its median deviation without a viewpoint, at most. Scans from one
-/// place leave 0.01 to 0.1 of it, surfaces that are sampled evenly, fused maps and random points 0.9 and more.
-const UNEXPLAINED: f64 = 0.4;
-/// Starts are the middle of the points and places about it, at so many sizes from it along each axis.
-const DISTANCES: [f64; 2] = [0.7, 3.0];
+/// place leave 0.01 to 0.1 of it, one point in four of them at random 0.45, surfaces that are sampled evenly, fused maps
+/// and random points 0.9 and more.
+const UNEXPLAINED: f64 = 0.6;
+/// Mean loss, at most: counts of neighbours that err by chance alone lose 0.56; a forest's thin trunks 0.65.
+const LARGEST_LOSS: f64 = 0.75;
+/// Starts are the middle of the points and places at so many sizes from it, along axes and diagonals: of six depth
+/// images two are missed with 6 directions and the first and last of the distances, none with these.
+const DISTANCES: [f64; 3] = [0.7, 1.5, 3.0];
 /// Starts that are fitted to the end.
 const FITTED: usize = 3;
 /// Steps of a fit, at most.
@@ -50,8 +56,8 @@ const UNKNOWNS: usize = 9;
 /// Those without the matrix.
 const EVEN: usize = 4;
 
-/// From where a sensor has measured points, which are finite; `None` where their density does not tell, or not all of
-/// them can be seen from there ([`all_seen_from`]).
+/// From where a sensor has measured points, which are finite; `None` where their density does not tell, or too many of
+/// them would be hidden from there.
 ///
 /// ```
 /// use surfsig::estimated_viewpoint;
@@ -75,8 +81,10 @@ const EVEN: usize = 4;
 pub fn estimated_viewpoint(points: &[[f64; 3]]) -> Option<[f64; 3]> {
     let densities = Densities::new(points)?;
     let found = densities.viewpoint()?;
-    let means = voxel_means(points, densities.size / VOXELS);
-    all_seen_from(found, &means, densities.size / VOXELS).then_some(found)
+    let voxel = densities.size / VOXELS;
+    // Such densities are as good evidence of a scan as rows of points are.
+    let hidden = hidden_share_from(found, &voxel_means(points, voxel), voxel);
+    (hidden < HIDDEN_IN_ROWS).then_some(found)
 }
 
 /// The surface around a point.
@@ -135,25 +143,32 @@ impl Densities {
     }
 
     fn viewpoint(&self) -> Option<[f64; 3]> {
-        let axes = Matrix3::<f64>::identity();
-        let about = DISTANCES.into_iter().flat_map(|distance| {
-            (0..6).map(move |k| {
-                axes.column(k / 2) * (if k % 2 == 0 { distance } else { -distance }) * self.size
-            })
+        let components = [-1.0_f64, 0.0, 1.0];
+        let about = components.into_iter().flat_map(|x| {
+            components
+                .into_iter()
+                .flat_map(move |y| components.into_iter().map(move |z| Vector3::new(x, y, z)))
         });
-        let starts: Vec<Vector3<f64>> = [Vector3::zeros()].into_iter().chain(about).collect();
+        // Axes have one component, diagonals three.
+        let directions = about.filter(|v| matches!(v.iter().filter(|x| **x != 0.0).count(), 1 | 3));
+        let directions: Vec<Vector3<f64>> = directions.map(|direction| direction.normalize()).collect();
+        let around = DISTANCES
+            .into_iter()
+            .flat_map(|distance| directions.iter().map(move |direction| direction * (distance * self.size)));
+        let starts: Vec<Vector3<f64>> = [Vector3::zeros()].into_iter().chain(around).collect();
         let mut fits: Vec<Fit> =
-            starts.into_par_iter().map(|start| self.fitted(self.begun(start), EVEN)).collect();
+            starts.into_par_iter().map(|start| self.fitted(self.begun(start), EVEN, COARSE_STEP)).collect();
         // A stable sort: of equal losses the first start.
         fits.sort_by(|a, b| a.loss.total_cmp(&b.loss));
         fits.truncate(FITTED);
-        let fits: Vec<Fit> = fits.into_par_iter().map(|fit| self.fitted(fit.unknowns, UNKNOWNS)).collect();
+        let fits: Vec<Fit> = fits.into_par_iter().map(|fit| self.fitted(fit.unknowns, UNKNOWNS, 1)).collect();
         let best = fits.into_iter().reduce(|best, fit| if fit.loss < best.loss { fit } else { best })?;
         let left = median(self.patches.iter().map(|patch| error(patch, &best.unknowns).abs()).collect())?;
         let middle = median(self.patches.iter().map(|patch| patch.density).collect())?;
         let before = median(self.patches.iter().map(|patch| (patch.density - middle).abs()).collect())?;
         let viewpoint = best.unknowns.fixed_rows::<3>(0) + self.middle;
-        (left < UNEXPLAINED * before && viewpoint.iter().all(|x| x.is_finite())).then(|| viewpoint.into())
+        let tells = best.loss < LARGEST_LOSS && left < UNEXPLAINED * before;
+        (tells && viewpoint.iter().all(|x| x.is_finite())).then(|| viewpoint.into())
     }
 
     /// A viewpoint with the density that fits it best, the same in all directions.
@@ -165,18 +180,19 @@ impl Densities {
         unknowns
     }
 
-    fn loss(&self, unknowns: &Unknowns) -> f64 {
+    fn loss(&self, unknowns: &Unknowns, step: usize) -> f64 {
         let loss = |patch: &Patch| (error(patch, unknowns) / LOSS).powi(2).ln_1p();
-        let loss = self.patches.iter().map(loss).sum::<f64>() / self.patches.len() as f64;
+        let loss = self.patches.iter().step_by(step).map(loss).sum::<f64>() / self.patches.len() as f64;
         if loss.is_nan() { f64::INFINITY } else { loss }
     }
 
-    /// Fits the first of the unknowns by iteratively reweighted least squares, damped as Levenberg and Marquardt do.
-    fn fitted(&self, start: Unknowns, used: usize) -> Fit {
-        let mut fit = Fit { unknowns: start, loss: self.loss(&start) };
+    /// Fits the first of the unknowns to one patch in `step`, by iteratively reweighted least squares, damped as
+    /// Levenberg and Marquardt do.
+    fn fitted(&self, start: Unknowns, used: usize, step: usize) -> Fit {
+        let mut fit = Fit { unknowns: start, loss: self.loss(&start, step) };
         let mut damping = 1e-3;
         for _ in 0..STEPS {
-            let (products, gradient) = self.normal_equations(&fit.unknowns, used);
+            let (products, gradient) = self.normal_equations(&fit.unknowns, used, step);
             let mut next = None;
             for _ in 0..ATTEMPTS {
                 let mut damped = products;
@@ -184,13 +200,13 @@ impl Densities {
                     damped[(k, k)] += damping * products[(k, k)] + f64::MIN_POSITIVE;
                 }
                 if let Some(factored) = damped.cholesky() {
-                    let mut step = -factored.solve(&gradient);
-                    let length = step.fixed_rows::<3>(0).norm();
+                    let mut change = -factored.solve(&gradient);
+                    let length = change.fixed_rows::<3>(0).norm();
                     if length > self.size {
-                        step *= self.size / length;
+                        change *= self.size / length;
                     }
-                    let unknowns = fit.unknowns + step;
-                    let loss = self.loss(&unknowns);
+                    let unknowns = fit.unknowns + change;
+                    let loss = self.loss(&unknowns, step);
                     if loss < fit.loss {
                         next = Some(Fit { unknowns, loss });
                         break;
@@ -214,9 +230,10 @@ impl Densities {
         &self,
         unknowns: &Unknowns,
         used: usize,
+        step: usize,
     ) -> (SMatrix<f64, UNKNOWNS, UNKNOWNS>, Unknowns) {
         let (mut products, mut gradient) = (SMatrix::zeros(), Unknowns::zeros());
-        for patch in &self.patches {
+        for patch in self.patches.iter().step_by(step) {
             let (error, mut row) = linearised(patch, unknowns);
             row.rows_mut(used, UNKNOWNS - used).fill(0.0);
             let weight = 1.0 / (1.0 + (error / LOSS).powi(2));
