@@ -14,37 +14,42 @@ use nalgebra::Vector3;
 /// From when on a surface holds a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct HeldLimits {
-    /// Share of what each of both normals says about a motion that both say alike.
+    /// Share of what the normals that are used say about a motion that both others say alike.
     pub share: f64,
     /// What both say alike, in standard errors.
     pub deviations: f64,
 }
 
-/// Places of a surface, each with two unit normals that err independently of each other, on the same side.
-pub(crate) struct IndependentNormals(Vec<([f64; 3], [Vector3<f64>; 2])>);
+/// A place of a surface with unit normals, of which the sides are open.
+pub(crate) struct PlaceNormals {
+    pub point: [f64; 3],
+    /// The one along which a transform was fitted.
+    pub used: [f64; 3],
+    /// Two that err independently of each other.
+    pub independent: [[f64; 3]; 2],
+}
+
+/// Places of a surface, each with two normals that err independently of each other.
+pub(crate) struct IndependentNormals(Vec<PlaceNormals>);
 
 impl IndependentNormals {
-    /// Takes places and both normals of each, of which the sides are open.
-    pub fn new(places: impl Iterator<Item = ([f64; 3], [[f64; 3]; 2])>) -> Self {
-        let on_one_side = |(point, normals): ([f64; 3], [[f64; 3]; 2])| {
-            let [one, other] = normals.map(Vector3::from);
-            (point, [one, other * one.dot(&other).signum()])
-        };
-        Self(places.map(on_one_side).collect())
+    pub fn new(places: impl Iterator<Item = PlaceNormals>) -> Self {
+        Self(places.collect())
     }
 
     /// Whether the surface holds points that move with a velocity: what both normals say alike is no chance, and so large
-    /// a share of what each says that the surface says more than the errors do.
+    /// a share of what the used ones say that the surface says more than their errors do.
     pub fn hold(&self, velocity: impl Fn(&[f64; 3]) -> Vector3<f64>, limits: HeldLimits) -> bool {
         let (mut said, mut alike, mut variance) = (0.0, 0.0, 0.0);
-        for (point, [one, other]) in &self.0 {
+        for PlaceNormals { point, used, independent } in &self.0 {
             let velocity = velocity(point);
-            let [one, other] = [one, other].map(|normal| normal.dot(&velocity));
-            // The mean of this product is the square of what the true normal says; that of each square is larger.
-            let product = one * other;
+            let [one, other] = independent.map(Vector3::from);
+            // The mean of this product, of normals on one side, is the square of what the true normal says; that of
+            // `said` is larger.
+            let product = one.dot(&velocity) * other.dot(&velocity) * one.dot(&other).signum();
             alike += product;
             variance += product * product;
-            said += 0.5 * (one * one + other * other);
+            said += Vector3::from(*used).dot(&velocity).powi(2);
         }
         alike > limits.share * said && alike > limits.deviations * f64::sqrt(variance)
     }
@@ -63,12 +68,14 @@ impl PointToSurface {
     ) -> Vec<FreeDirection> {
         let motions = Motions::new(&self.points, &self.normals);
         let to_source = self.T_target_source.inverse();
-        let normals_at = |point: &[f64; 3]| {
+        let normals_at = |(point, used): (&[f64; 3], &[f64; 3])| {
             let ours = source.surface(source.nearest(to_source.transform_point(*point), reach)?).1;
             let theirs = target.surface(target.nearest(*point, reach)?).1;
-            Some((*point, [self.T_target_source.transform_vector(ours), theirs]))
+            let independent = [self.T_target_source.transform_vector(ours), theirs];
+            Some(PlaceNormals { point: *point, used: *used, independent })
         };
-        let both = IndependentNormals::new(self.points.iter().filter_map(normals_at));
+        let inliers = self.points.iter().zip(&self.normals);
+        let both = IndependentNormals::new(inliers.filter_map(normals_at));
         motions.named(|sliding, number| {
             sliding <= UNOBSERVABLE
                 || sliding <= weak && !both.hold(|point| motions.velocity(number, point), limits)
@@ -126,7 +133,12 @@ mod tests {
         let flipped = |sign: f64| {
             let places = (0..500).map(|i| {
                 let x = f64::from(i) / 500.0 - 0.5;
-                ([x, 0.0, 0.0], [[0.6, 0.0, 0.8], [0.6 * sign, 0.0, 0.8 * sign]])
+                let normal = [0.6, 0.0, 0.8];
+                PlaceNormals {
+                    point: [x, 0.0, 0.0],
+                    used: normal,
+                    independent: [normal, normal.map(|n| n * sign)],
+                }
             });
             IndependentNormals::new(places).hold(|_| Vector3::x(), LIMITS)
         };

@@ -99,8 +99,9 @@ pub struct RivalSettings {
     /// The root mean square of the distances from the surface over the points' paths, below which a motion is weakly
     /// held.
     pub weak: f64,
-    /// Share of what the normals of each scan say about a weak motion that both say alike, from which on the surface holds
-    /// it: 0.7 and more of what corridors with niches hold, 0.3 and less of smooth corridors (`benchmarks/trust.py`).
+    /// Share of what the target's normals say about a weak motion that those of both scans say alike, from which on the
+    /// surface holds it: 0.7 and more of what corridors with niches hold, 0.3 and less of smooth corridors
+    /// (`benchmarks/trust.py`).
     pub held_share: f64,
     /// What both say alike, in standard errors, likewise.
     pub held_deviations: f64,

@@ -228,7 +228,7 @@ mod tests {
     use super::super::settings::ScanAlignmentSettings;
     use super::*;
     use crate::KdTree;
-    use crate::alignment::{HeldLimits, IndependentNormals};
+    use crate::alignment::{HeldLimits, IndependentNormals, PlaceNormals};
     use crate::random::uniform;
     use nalgebra::Vector3;
     use proptest::prelude::*;
@@ -266,7 +266,9 @@ mod tests {
         let riser = (0..(60.0 * height * 4.0) as usize)
             .map(|i| [noise * at(i, 3), 60.0 * at(i, 4), height * (0.5 + at(i, 5))]);
         map.add(floor.chain(riser), 0);
-        let halves = (0..).zip(map.points()).filter_map(|(i, point)| Some((*point, map.half_normals(i)?)));
+        let halves = (0..).zip(map.points()).filter_map(|(i, &point)| {
+            Some(PlaceNormals { point, used: map.normal(i)?, independent: map.half_normals(i)? })
+        });
         let ScanAlignmentSettings { held_share, held_deviations, .. } = ScanAlignmentSettings::default();
         let limits = HeldLimits { share: held_share, deviations: held_deviations };
         IndependentNormals::new(halves).hold(|_| Vector3::x(), limits)

@@ -7,7 +7,7 @@ use super::settings::ScanAlignmentSettings;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
 use crate::alignment::{
-    FreeDirection, GicpSettings, HeldLimits, IndependentNormals, Motions, UNOBSERVABLE, blocks,
+    FreeDirection, GicpSettings, HeldLimits, IndependentNormals, Motions, PlaceNormals, UNOBSERVABLE, blocks,
     clustered_covariance, gicp_with, halves, lengths, orthonormal, solve_determined, systematic_covariance,
     unscaled,
 };
@@ -339,8 +339,10 @@ impl PointToPlane {
     fn half_normals(&self, map: &LocalMap, pose: &RigidTransform, samples: usize) -> IndependentNormals {
         let to_scan = pose.inverse();
         let of_point = |i: usize| {
+            let used = to_scan.transform_vector(map.normal(self.targets[i])?);
             let halves = map.half_normals(self.targets[i])?;
-            Some((self.points[i], halves.map(|half| to_scan.transform_vector(half))))
+            let independent = halves.map(|half| to_scan.transform_vector(half));
+            Some(PlaceNormals { point: self.points[i], used, independent })
         };
         IndependentNormals::new(some_of(self.points.len(), samples).into_iter().filter_map(of_point))
     }

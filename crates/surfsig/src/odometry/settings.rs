@@ -141,9 +141,8 @@ pub struct ScanAlignmentSettings {
     pub weak: f64,
     /// Correspondences, at most, by which it is told whether the surface holds a weak motion, or errors of its normals do.
     pub held_samples: usize,
-    /// Share of what each of both halves of the map's neighbourhoods says about a motion that both say alike, from which on
-    /// the surface holds it: errors of a half have twice the variance of the whole's, so that a third is where the
-    /// surface says as much as errors of the whole do.
+    /// Share of what the map's normals say about a motion that both halves of their neighbourhoods say alike, from which
+    /// on the surface holds it.
     pub held_share: f64,
     /// What both say alike, in standard errors, likewise.
     pub held_deviations: f64,
@@ -175,7 +174,7 @@ impl Default for ScanAlignmentSettings {
             explained_distance: 1.2,
             weak: 0.25,
             held_samples: 2000,
-            held_share: 1.0 / 3.0,
+            held_share: 0.5,
             held_deviations: 3.0,
             constrained_steps: 3,
             deskew_steps: 3,
