@@ -361,6 +361,7 @@ class RecurrenceSettings:
         rival_proposals: int | None = None,
         rival_rounds: int | None = None,
         examined_points: int | None = None,
+        surface_points: int | None = None,
         object_points: int | None = None,
         symmetry_excess: float | None = None,
         rival_distance: float | None = None,
@@ -471,11 +472,14 @@ class RecurrenceSettings:
     def examined_points(self) -> int:
         """Points of each piece by which a pose is examined."""
     @property
+    def surface_points(self) -> int:
+        """Points of each piece that make its surface, at most."""
+    @property
     def object_points(self) -> int:
         """Points of all pieces of a group that show how the object looks, at most."""
     @property
     def symmetry_excess(self) -> float:
-        """By how much an object's share of points in free space may grow with a motion after which it looks the same."""
+        """By how much an object's share of points in free space may grow with a symmetry."""
     @property
     def rival_distance(self) -> float:
         """Radii of a patch by which a rival moves points elsewhere, at least."""
@@ -505,7 +509,7 @@ class RecurrenceSettings:
         """Share of points in sight that disagree, from which on the mirror image is tried."""
     @property
     def mirrored_disagreement(self) -> float:
-        """What disagrees then, over what disagrees without, below which the mirror image is the better one."""
+        """What disagrees then, over what disagrees without, below which the mirror image is better."""
     @property
     def doubted_scale(self) -> float:
         """Logarithm of a scale from which on it is doubted."""

@@ -74,9 +74,11 @@ settings_class! {
         rival_rounds: usize = rival_rounds,
         /// Points of each piece by which a pose is examined.
         examined_points: usize = examined_points,
+        /// Points of each piece that make its surface, at most.
+        surface_points: usize = surface_points,
         /// Points of all pieces of a group that show how the object looks, at most.
         object_points: usize = object_points,
-        /// By how much an object's share of points in free space may grow with a motion after which it looks the same.
+        /// By how much an object's share of points in free space may grow with a symmetry.
         symmetry_excess: f64 = symmetry_excess,
         /// Radii of a patch by which a rival moves points elsewhere, at least.
         rival_distance: f64 = rivals.distance,
@@ -96,7 +98,7 @@ settings_class! {
         trusted_overlap: f64 = trusted_overlap,
         /// Share of points in sight that disagree, from which on the mirror image is tried.
         doubted_disagreement: f64 = doubted_disagreement,
-        /// What disagrees then, over what disagrees without, below which the mirror image is the better one.
+        /// What disagrees then, over what disagrees without, below which the mirror image is better.
         mirrored_disagreement: f64 = mirrored_disagreement,
         /// Logarithm of a scale from which on it is doubted.
         doubted_scale: f64 = doubted_scale,

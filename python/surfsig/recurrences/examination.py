@@ -52,10 +52,10 @@ def examined_members(
     examined = examine_poses(views, poses, settings=settings, threads=threads)
     centers = [np.asarray(view.center) + origin for view, origin in zip(views, origins, strict=True)]
     first_of = {member: members[0] for members in groups for member in members}
-    found = {
-        piece: _occurrence(piece, float(scores[before, piece]), told, centers[first_of[piece]], centers[piece])
-        for (before, piece), told in zip(links, examined, strict=True)
-    }
+    found = {}
+    for (before, piece), told in zip(links, examined, strict=True):
+        first, score = centers[first_of[piece]], float(scores[before, piece])
+        found[piece] = _occurrence(piece, score, told, first, centers[piece])
     return [[_first(members[0]), *(found[member] for member in members[1:])] for members in groups]
 
 

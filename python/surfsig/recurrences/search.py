@@ -114,9 +114,7 @@ def find_recurrences(
         if len(members) > 1
     ]
     origins = [scans[piece.scan].cloud.origin for piece in pieces[: len(views)]]
-    examined = examined_members(
-        members, pairs, scores, views, origins, settings=settings, threads=workers
-    )
+    examined = examined_members(members, pairs, scores, views, origins, settings=settings, threads=workers)
     groups = [
         Recurrence(occurrences, free_directions(*smooth[occurrences[0].piece])) for occurrences in examined
     ]

@@ -49,4 +49,4 @@ pub use point_to_surface::PointToSurfaceSettings;
 pub(crate) use point_to_surface::{PointToSurface, TargetSurface};
 pub use rivals::{Alternative, RivalSettings};
 pub(crate) use rivals::{FittedSurface, FittedTarget, Rivals, ScaleLimits};
-pub(crate) use symmetry::symmetries;
+pub(crate) use symmetry::{partial_symmetries, symmetries};

@@ -4,7 +4,7 @@ use super::agreement::PiecePair;
 use super::pose_search::{self, measured};
 use super::result::PoseEvidence;
 use crate::alignment::{
-    Alternative, Closeness, Doubt, Explained, FittedSurface, FittedTarget, FreeDirection, HIDDEN, PointToSurface,
+    Alternative, Closeness, Doubt, Explained, FittedSurface, FittedTarget, FreeDirection, HIDDEN,
     PointToSurfaceSettings, Rivals, ScaleLimits, TargetSurface, without_free_motion,
 };
 use crate::depth_image::{DepthImage, Judgement, SurfacePlace};
@@ -105,23 +105,19 @@ impl PiecePair<'_> {
     #[allow(non_snake_case)]
     pub fn examined(&self, T_target_source: &RigidTransform, key: &[u64]) -> Examination {
         let settings = self.settings;
-        let radius = self.radius();
         let own = measured(self, T_target_source);
-        let surface = TargetSurface::new(self.target.places(), self.target.voxel);
-        let all = self.source.places();
-        let some = &all[..settings.examined_points.min(all.len())];
+        let some = self.source.places(settings.examined_points);
         let rivals = Rivals {
             surface: BothViews { pair: self, best: *T_target_source },
-            source: some,
+            source: &some,
             T_target_source: *T_target_source,
-            radius,
+            radius: self.radius(),
             settings: settings.rivals,
         };
         let best = rivals.explained();
-        let fit = surface.align(some, *T_target_source, &settings.point_to_surface);
-        let no_fit = Vec::new();
-        let (points, normals) = fit.as_ref().map_or((&no_fit, &no_fit), |fit| (&fit.points, &fit.normals));
-        let free_directions = rivals.free_directions(&best, points, normals);
+        let surface = self.target_surface();
+        let (points, normals) = self.common_surface(&surface, T_target_source);
+        let free_directions = rivals.free_directions(&best, &points, &normals);
         let leads_elsewhere =
             |one: &RigidTransform, other: &RigidTransform| self.is_elsewhere(one, other, &free_directions);
         let proposed = self.rivals(T_target_source, leads_elsewhere, &mut Generator::new(key));
@@ -143,8 +139,7 @@ impl PiecePair<'_> {
                 alternatives.push(Alternative { T_target_source: transform, explained, free_space });
             }
         }
-        let (scale, doubt) =
-            fit.map_or(([f64::NAN; 2], None), |fit| self.scale(&surface, &fit, some, radius));
+        let (scale, doubt) = self.scale(&surface, &T_target_source.transform_points(&some));
         let mut doubts: Vec<Doubt> = doubt.into_iter().collect();
         doubts.extend(self.mirrored(&own.judgements, key));
         let evidence = PoseEvidence {
@@ -179,24 +174,45 @@ impl PiecePair<'_> {
         distance > self.settings.rivals.distance * self.radius()
     }
 
-    /// The scale of the source and its standard error, and the doubt whether it is 1.
-    fn scale(
+    fn target_surface(&self) -> TargetSurface {
+        let places = self.target.places(self.settings.surface_points);
+        // Some of the points are farther from each other than all of them are.
+        let thinner = self.target.points.len() as f64 / places.len().max(1) as f64;
+        TargetSurface::new(places, self.target.voxel * thinner.sqrt())
+    }
+
+    /// Points of the source that a pose brings to the target's surface, where that is smooth, and its normals there.
+    ///
+    /// At edges normals are those of no face, which would seem to hold motions.
+    #[allow(non_snake_case)]
+    fn common_surface(
         &self,
         surface: &TargetSurface,
-        fit: &PointToSurface,
-        some: &[[f64; 3]],
-        radius: f64,
-    ) -> ([f64; 2], Option<Doubt>) {
+        T_target_source: &RigidTransform,
+    ) -> (Vec<[f64; 3]>, Vec<[f64; 3]>) {
+        let at_pose = PointToSurfaceSettings { max_iterations: 0, ..self.settings.point_to_surface };
+        let places = self.source.places(self.settings.surface_points);
+        if let Some(found) = surface.align(&places, *T_target_source, &at_pose) {
+            return (found.points, found.normals);
+        }
+        // Pieces too small for that.
+        let rows = self.residuals(T_target_source, self.settings.surface_points).into_iter();
+        rows.map(|(point, normal, _)| (<[f64; 3]>::from(point), <[f64; 3]>::from(normal))).unzip()
+    }
+
+    /// The scale of the source, of which some points are given in the target, and its standard error, and the doubt
+    /// whether it is 1.
+    fn scale(&self, surface: &TargetSurface, moved: &[[f64; 3]]) -> ([f64; 2], Option<Doubt>) {
         let settings = self.settings;
-        let wide = PointToSurfaceSettings {
-            max_distance: settings.rival_distance * radius / self.target.voxel,
+        let fit = PointToSurfaceSettings {
+            max_distance: settings.rival_distance * self.radius() / self.target.voxel,
             ..settings.point_to_surface
         };
-        let target = FittedTarget { surface, farthest: fit.farthest, fit: wide, is_hidden: &|_| false };
-        let moved = fit.T_target_source.transform_points(some);
-        let best = Explained::new(target.closeness_of(&moved), some);
+        let farthest = f64::from(self.target.tolerance);
+        let target = FittedTarget { surface, farthest, fit, is_hidden: &|_| false };
+        let best = Explained::new(target.closeness_of(moved), moved);
         let limits = ScaleLimits { doubted: settings.doubted_scale, deviations: settings.scale_deviations };
-        let (scale, doubt) = target.scale(&moved, &best, limits);
+        let (scale, doubt) = target.scale(moved, &best, limits);
         (scale.map_or([f64::NAN; 2], |found| [found.scale, found.standard_error]), doubt)
     }
 
@@ -215,5 +231,82 @@ impl PiecePair<'_> {
             && confirmed(&found.judgements) >= confirmed(own);
         let inliers = f64::from(found.judgements[0].confirmed) * source.points.len() as f64;
         is_better.then_some(Doubt::Mirrored { inliers: inliers.round() as usize })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{FLAT, SHEET, sheet};
+    use super::super::{PieceView, RecurrenceSettings, examine_poses};
+    use super::*;
+    use crate::Monitor;
+    use crate::recurrences::ExaminedPose;
+
+    /// The pose of a source on a target, both of which were scanned from the same place.
+    fn examined(source: [f64; 3], target: [f64; 3]) -> ExaminedPose {
+        let itself = RigidTransform::identity();
+        let [source, target] = [source, target].map(|shape| sheet(shape, &itself));
+        let center = |view: &PieceView| RigidTransform::from_rotation_vector([0.0; 3], view.center());
+        let pose = center(&target).inverse() * center(&source);
+        let settings = RecurrenceSettings::default();
+        examine_poses(&[&source, &target], &[([0, 1], pose)], &settings, &Monitor::default())
+            .unwrap()
+            .remove(0)
+    }
+
+    fn names(found: &ExaminedPose) -> Vec<&'static str> {
+        found.doubts.iter().map(Doubt::name).collect()
+    }
+
+    #[test]
+    fn a_sheet_that_no_motion_brings_onto_itself_is_trusted() {
+        let found = examined(SHEET, SHEET);
+        assert_eq!(found.doubts, []);
+        assert!(found.free_directions.is_empty() && found.alternatives.is_empty());
+        let evidence = found.evidence;
+        assert!((evidence.scale - 1.0).abs() < 4.0 * evidence.scale_standard_error + 1e-3, "{evidence:?}");
+        assert!(evidence.overlap > 0.99 && evidence.free_space < 0.01, "{evidence:?}");
+    }
+
+    #[test]
+    fn a_flat_sheet_slides_and_rotates_and_has_no_scale() {
+        let found = examined(FLAT, FLAT);
+        assert_eq!(names(&found), ["free_directions"]);
+        assert_eq!(found.free_directions.len(), 3);
+        assert!(found.evidence.scale.is_nan() && found.evidence.scale_standard_error.is_nan());
+    }
+
+    #[test]
+    fn a_mirrored_sheet_is_told() {
+        let [a, b, c] = SHEET;
+        let found = examined([a, -b, c], SHEET);
+        assert!(names(&found).contains(&"mirrored"), "{found:?}");
+    }
+
+    #[test]
+    fn a_larger_sheet_is_told_with_its_scale() {
+        let ([a, b, c], scale) = (SHEET, 1.05);
+        let found = examined([a / scale, b / scale, c / scale.powi(2)], SHEET);
+        assert!(names(&found).contains(&"scale"), "{found:?}");
+        let evidence = found.evidence;
+        assert!((evidence.scale - scale).abs() < 4.0 * evidence.scale_standard_error, "{evidence:?}");
+    }
+
+    #[test]
+    fn what_a_pose_leaves_open_its_followers_do_too() {
+        let itself = RigidTransform::identity();
+        let [flat, bent] = [FLAT, SHEET].map(|shape| sheet(shape, &itself));
+        let settings = RecurrenceSettings::default();
+        let poses = [([0, 1], itself), ([1, 2], itself), ([3, 4], itself)];
+        let found = |threads| {
+            let settings = RecurrenceSettings { threads: Some(threads), ..settings.clone() };
+            let views = [&flat, &flat, &flat, &bent, &bent];
+            examine_poses(&views, &poses, &settings, &Monitor::default()).unwrap()
+        };
+        let one = found(1);
+        assert_eq!(one.iter().map(|pose| pose.free_directions.len()).collect::<Vec<_>>(), [3, 3, 0]);
+        assert_eq!(format!("{:?}", found(3)), format!("{one:?}"), "NaN is equal to nothing but in words");
+        let missing = [([0, 5], itself)];
+        assert!(examine_poses(&[&flat], &missing, &settings, &Monitor::default()).is_err());
     }
 }

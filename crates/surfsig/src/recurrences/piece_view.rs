@@ -176,9 +176,9 @@ impl PieceView {
         }
     }
 
-    /// The places of `points`.
-    pub(super) fn places(&self) -> Vec<[f64; 3]> {
-        self.points.iter().map(|point| point.place.map(f64::from)).collect()
+    /// The places of the first `most` points.
+    pub(super) fn places(&self, most: usize) -> Vec<[f64; 3]> {
+        self.points.iter().take(most).map(|point| point.place.map(f64::from)).collect()
     }
 
     /// The mean of the piece's points, in the scan: the origin of poses.

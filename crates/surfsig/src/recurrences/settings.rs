@@ -83,14 +83,17 @@ pub struct RecurrenceSettings {
     pub rival_rounds: usize,
     /// Points of each piece by which a pose is examined: shares of 400 have a standard error of 0.025 at most.
     pub examined_points: usize,
+    /// Points of each piece that make its surface, at most, which tells free directions and the scale.
+    pub surface_points: usize,
     /// Points of all pieces of a group that show how the object looks, at most.
     pub object_points: usize,
-    /// By how much the share of an object's points in free space may grow with a motion after which it looks the same.
+    /// By how much an object's share of points in free space may grow with a motion after which it looks the same, and
+    /// what may not be explained any more: poses of all pieces err.
     pub symmetry_excess: f64,
     /// What a rival explains over what the best pose does, at least: with a half turn two sensors that saw three faces
     /// of a box have one or two in common.
     pub least_explained: f64,
-    /// How the points of a piece are fitted to the surface of another one, which tells free directions and the scale.
+    /// How points are fitted to the surface of another piece, which tells free directions and the scale.
     pub point_to_surface: PointToSurfaceSettings,
     /// Distance from the surface, in radii, from which pieces of another size are fitted: as in finding.
     pub rival_distance: f64,
@@ -144,13 +147,14 @@ impl Default for RecurrenceSettings {
             planar_weight: 0.7,
             round_spread: 0.1,
             radius_share: 0.4,
-            rivals: RivalSettings { proposals: 3, ..Default::default() },
-            rival_proposals: 400,
+            rivals: RivalSettings { proposals: 4, ..Default::default() },
+            rival_proposals: 600,
             rival_rounds: 2,
             examined_points: 400,
-            object_points: 1500,
+            surface_points: 1500,
+            object_points: 800,
             symmetry_excess: 0.05,
-            least_explained: 0.5,
+            least_explained: 0.25,
             point_to_surface: PointToSurfaceSettings::default(),
             rival_distance: 0.55,
             free_space_excess: 0.01,
