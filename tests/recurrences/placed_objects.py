@@ -76,4 +76,5 @@ def scanned(
     sheets, scan = np.unique(cloud.offsets[:, 1], return_inverse=True)
     cloud.fields["scan"] = scan.astype(np.int32)
     cloud.fields["object"] = np.array(object_of_surface)[cloud.fields["surface"]]
-    return surfsig.PointCloud(offsets=cloud.offsets, fields=cloud.fields, viewpoints=SCANNER.laser_at(sheets))
+    seen_from = SCANNER.laser_at(sheets)
+    return surfsig.PointCloud(offsets=cloud.offsets, fields=cloud.fields, viewpoints=seen_from), poses

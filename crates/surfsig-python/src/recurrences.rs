@@ -7,7 +7,9 @@ use crate::{invalid_input, rows, to_python};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use surfsig::{ExaminedPose, Monitor, OrientedScan, PieceAlignment, PieceSituation, PosesOfPair, RigidTransform};
+use surfsig::{
+    ExaminedPose, Monitor, OrientedScan, PieceAlignment, PieceSituation, PosesOfPair, RigidTransform,
+};
 
 settings_class! {
     /// How poses between pieces are searched and judged, for experts; see `surfsig.find_recurrences`.

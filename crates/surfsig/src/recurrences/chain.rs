@@ -139,7 +139,8 @@ fn alternatives(
 
 /// What speaks against a pose: what is measured, and doubts of another kind that it already has.
 fn doubts(found: &ExaminedPose, settings: &RecurrenceSettings) -> Vec<Doubt> {
-    let PoseEvidence { overlap, free_space, scale, scale_standard_error: standard_error, .. } = found.evidence;
+    let PoseEvidence { overlap, free_space, scale, scale_standard_error: standard_error, .. } =
+        found.evidence;
     let of_kind = |is_kind: fn(&Doubt) -> bool| found.doubts.iter().copied().find(|doubt| is_kind(doubt));
     let mut doubts = Vec::new();
     if overlap < settings.trusted_overlap {
@@ -157,6 +158,7 @@ fn doubts(found: &ExaminedPose, settings: &RecurrenceSettings) -> Vec<Doubt> {
     doubts.extend(of_kind(|doubt| matches!(doubt, Doubt::Mirrored { .. })));
     // One size that differs is enough; what it is of the whole chain is known where each pose determines it.
     let size = of_kind(|doubt| matches!(doubt, Doubt::Scale { .. }));
-    doubts.extend(size.map(|size| if scale.is_nan() { size } else { Doubt::Scale { scale, standard_error } }));
+    doubts
+        .extend(size.map(|size| if scale.is_nan() { size } else { Doubt::Scale { scale, standard_error } }));
     doubts
 }

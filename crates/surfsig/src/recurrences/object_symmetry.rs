@@ -32,7 +32,10 @@ struct Object<'a> {
 /// its free motions only.
 ///
 /// What no sensor saw speaks neither for a motion nor against it.
-pub(super) fn object_symmetries(members: &[Member<'_>], settings: &RecurrenceSettings) -> Vec<ObjectSymmetry> {
+pub(super) fn object_symmetries(
+    members: &[Member<'_>],
+    settings: &RecurrenceSettings,
+) -> Vec<ObjectSymmetry> {
     let Some(&(first, _)) = members.first() else { return Vec::new() };
     let object = Object::new(members, settings);
     let places: Vec<[f64; 3]> = object.points.iter().map(|point| point.place.map(f64::from)).collect();
@@ -77,7 +80,11 @@ impl<'a> Object<'a> {
     }
 
     /// Of the points, moved, what each member's image says.
-    fn counts<'b>(&'b self, motion: &'b RigidTransform, point: &'b SurfacePlace) -> impl Iterator<Item = Counts> + 'b {
+    fn counts<'b>(
+        &'b self,
+        motion: &'b RigidTransform,
+        point: &'b SurfacePlace,
+    ) -> impl Iterator<Item = Counts> + 'b {
         self.members.iter().map(move |(piece, pose)| {
             let to_image = piece.image.to_image(&(*pose * *motion));
             piece.image.count(&to_image, &[*point], piece.tolerance)

@@ -164,10 +164,8 @@ impl PieceView {
     /// The mirror image of the piece and of what is around it, x to -x.
     pub(super) fn mirrored(&self) -> Self {
         let mirror = |[x, y, z]: [f32; 3]| [-x, y, z];
-        let mirrored = |point: &SurfacePlace| SurfacePlace {
-            place: mirror(point.place),
-            normal: mirror(point.normal),
-        };
+        let mirrored =
+            |point: &SurfacePlace| SurfacePlace { place: mirror(point.place), normal: mirror(point.normal) };
         Self {
             points: self.points.iter().map(mirrored).collect(),
             pairs: self.pairs.mirrored(),
