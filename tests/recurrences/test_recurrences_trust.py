@@ -39,7 +39,7 @@ def seen() -> Seen:
         *[(KINDS["thick can"], 0.023, 0.0)] * 3,
         *[(KINDS["large ball"], 0.021, 0.0)] * 2,
         *[(KINDS["box"], 0.011, angle) for angle in angles],
-        *[(KINDS["bracket"], 0.018, angle) for angle in (-1.2, -1.5, -1.0)],
+        *[(KINDS["bracket"], 0.018, angle) for angle in (-0.7, -0.9, -0.6)],
     ]
     cloud, poses = scanned(objects, columns=4, seed=5)
     return cloud, surfsig.find_recurrences(surfsig.find_surfaces(cloud)), poses
@@ -102,10 +102,12 @@ def test_equal_poses_of_a_box_are_listed(seen: Seen, followers: Followers) -> No
             poses[objects[box.piece]] @ np.diag([*signs, 1.0]) @ np.linalg.inv(poses[objects[first]])
             for signs in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
         ]
+        # All stand on the same side: that the box looks the same upside down was not seen.
+        assert box.alternatives
         others = [box.T_member_first, *(other.T_target_source for other in box.alternatives)]
-        assert len(others) == 4
-        nearest = {int(np.argmin([np.linalg.norm(pose - one) for one in true])) for pose in others}
-        assert nearest == {0, 1, 2, 3}
+        angles = np.array([[angle_between(pose, one) for one in true] for pose in others])
+        assert angles.min(axis=1).max() < np.radians(3.0)
+        assert len(set(angles.argmin(axis=1).tolist())) == len(others)
 
 
 @pytest.mark.slow
@@ -139,13 +141,18 @@ def test_what_is_said_of_poses_is_in_tables_and_json(seen: Seen) -> None:
     assert rows[0][-1].endswith(f" of {len(found[0]) - 1}")
 
 
+def angle_between(a: Array, b: Array) -> float:
+    """Give the angle of the rotation between two poses, in radians."""
+    return float(np.arccos(np.clip((np.trace(a[:3, :3] @ b[:3, :3].T) - 1.0) / 2.0, -1.0, 1.0)))
+
+
 def examined(one: Solids, other: Solids, scale: float = 1.0, *, search: bool = True) -> dict[str, Any]:
     """Scan two objects beside two balls, and examine the pose of the first on the second.
 
     The pose is searched, or the true one as if both were equal.
     """
     balls = [(KINDS["large ball"], 0.021, 0.0)] * 2
-    cloud, poses = scanned([(one, 0.018, -1.2), (other, 0.018 * scale, -1.5), *balls], columns=2, seed=3)
+    cloud, poses = scanned([(one, 0.018, -0.7), (other, 0.018 * scale, -0.9), *balls], columns=2, seed=3)
     scan = ScanPieces(0, surfsig.find_surfaces(cloud), 100, None)
     own = cloud.fields["object"]
     objects = [int(np.bincount(own[piece]).argmax()) for piece in scan.pieces]
@@ -190,8 +197,8 @@ def test_a_larger_bracket_is_not_trusted(scale: float) -> None:
 
 @pytest.mark.slow
 def test_mirrored_and_larger_copies_are_in_no_group_or_not_trusted() -> None:
-    objects = [(BOSSED, 0.018, -1.2), (BOSSED, 0.018, -1.5), (MIRRORED, 0.018, -1.3)]
-    cloud, _ = scanned([*objects, (enlarged(BOSSED, 1.1), 0.0198, -1.3)], columns=2, seed=5)
+    objects = [(BOSSED, 0.018, -0.7), (BOSSED, 0.018, -0.9), (MIRRORED, 0.018, -0.8)]
+    cloud, _ = scanned([*objects, (enlarged(BOSSED, 1.1), 0.0198, -0.8)], columns=2, seed=5)
     found = surfsig.find_recurrences(surfsig.find_surfaces(cloud))
     own = objects_of(cloud, found)
     kinds = [min(1, number // 2) + (number == 3) for number in own]
