@@ -95,7 +95,7 @@ def trusted_poses(scene: RecurrenceScene, found: surfsig.Recurrences) -> tuple[i
     own = [scene.object_of_point[piece.points] for piece in found.pieces]
     object_of = [int(np.bincount(numbers[numbers >= 0]).argmax()) for numbers in own]
     trusted = wrong = 0
-    for group in found:
+    for group in found.groups:
         first = object_of[group.members[0].piece]
         for member in group.members[1:]:
             if member.trusted:

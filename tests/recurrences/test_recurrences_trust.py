@@ -55,7 +55,9 @@ def followers(seen: Seen) -> Followers:
     objects = objects_of(cloud, found)
 
     def of(expected: list[int]) -> list[surfsig.Occurrence]:
-        (group,) = [group for group in found if sorted(objects[piece] for piece in group.pieces) == expected]
+        (group,) = [
+            group for group in found.groups if sorted(objects[piece] for piece in group.pieces) == expected
+        ]
         first = group.members[0]
         assert first.trusted
         np.testing.assert_array_equal(first.T_member_first, np.eye(4))
@@ -97,7 +99,7 @@ def test_equal_poses_of_a_box_are_listed(seen: Seen, followers: Followers) -> No
     for box in followers(BOXES):
         assert not box.trusted
         assert "ambiguous" in box.doubts
-        first = next(group.pieces[0] for group in found if box.piece in group.pieces)
+        first = next(group.pieces[0] for group in found.groups if box.piece in group.pieces)
         true = [
             poses[objects[box.piece]] @ np.diag([*signs, 1.0]) @ np.linalg.inv(poses[objects[first]])
             for signs in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
@@ -117,7 +119,7 @@ def test_a_bracket_is_trusted(seen: Seen, followers: Followers) -> None:
     for bracket in followers(BRACKETS):
         assert bracket.trusted, bracket
         assert (bracket.free_directions, bracket.alternatives, bracket.reasons) == ([], [], [])
-        first = next(group.pieces[0] for group in found if bracket.piece in group.pieces)
+        first = next(group.pieces[0] for group in found.groups if bracket.piece in group.pieces)
         true = poses[objects[bracket.piece]] @ np.linalg.inv(poses[objects[first]])
         middle = poses[objects[first]][:, 3]
         assert np.linalg.norm((bracket.T_member_first - true) @ middle) < 1e-3
@@ -128,7 +130,7 @@ def test_what_is_said_of_poses_is_in_tables_and_json(seen: Seen) -> None:
     _, found, _ = seen
     values = json.loads(json.dumps(found.values()))["groups"]
     table = found.to_pandas()
-    for group, told in zip(found, values, strict=True):
+    for group, told in zip(found.groups, values, strict=True):
         for member, plain in zip(group.members, told["members"], strict=True):
             assert plain == json.loads(json.dumps(member.values()))
             assert len(plain["alternatives"]) == len(member.alternatives)
@@ -202,7 +204,7 @@ def test_mirrored_and_larger_copies_are_in_no_group_or_not_trusted() -> None:
     found = surfsig.find_recurrences(surfsig.find_surfaces(cloud))
     own = objects_of(cloud, found)
     kinds = [min(1, number // 2) + (number == 3) for number in own]
-    for group in found:
+    for group in found.groups:
         first = kinds[group.pieces[0]]
         for member in group.members[1:]:
             # They may look equal where little of them is seen.
