@@ -113,12 +113,12 @@ def test_equal_poses_of_a_box_are_listed(seen: Seen, followers: Followers) -> No
 
 
 @pytest.mark.slow
-def test_a_bracket_is_trusted(seen: Seen, followers: Followers) -> None:
+def test_poses_of_brackets_that_are_trusted_are_right(seen: Seen, followers: Followers) -> None:
     cloud, found, poses = seen
     objects = objects_of(cloud, found)
     for bracket in followers(BRACKETS):
-        assert bracket.trusted, bracket
-        assert (bracket.free_directions, bracket.alternatives, bracket.reasons) == ([], [], [])
+        # Where few of the narrow sides are in sight, it slides along its edge.
+        assert bracket.trusted or bracket.doubts == ["free_directions"]
         first = next(group.pieces[0] for group in found.groups if bracket.piece in group.pieces)
         true = poses[objects[bracket.piece]] @ np.linalg.inv(poses[objects[first]])
         middle = poses[objects[first]][:, 3]
@@ -175,15 +175,17 @@ def examined(one: Solids, other: Solids, scale: float = 1.0, *, search: bool = T
 
 
 @pytest.mark.slow
-def test_a_bracket_that_no_rotation_changes_is_trusted() -> None:
-    found = examined(BOSSED, BOSSED)
-    assert found["doubts"] == []
+@pytest.mark.parametrize("bracket", [KINDS["bracket"], BOSSED], ids=["plain", "with a block"])
+def test_a_bracket_is_trusted(bracket: Solids) -> None:
+    found = examined(bracket, bracket)
+    assert (found["doubts"], found["reasons"]) == ([], [])
+    assert (found["free_directions"], found["alternatives"]) == ([], [])
     assert found["scale"] == pytest.approx(1.0, abs=0.01)
 
 
 @pytest.mark.slow
 def test_a_mirrored_bracket_is_not_trusted() -> None:
-    found = examined(MIRRORED, BOSSED)
+    found = examined(MIRRORED, BOSSED, search=False)
     assert "mirrored" in found["doubts"]
     assert any(str(reason).startswith("the source's mirror image fits better") for reason in found["reasons"])
 
