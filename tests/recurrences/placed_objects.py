@@ -28,7 +28,7 @@ LEVEL = 2e-3
 
 def enlarged(solids: Solids, scale: float) -> Solids:
     """Make boxes larger, and set them apart as far."""
-    made = []
+    made: Solids = []
     for surface, pose in solids:
         assert isinstance(surface, simulate.Box)
         x, y, z = surface.size

@@ -229,7 +229,7 @@ class Recurrences:
         for number, group in enumerate(self.groups):
             for member in group.members:
                 piece, pose = self.pieces[member.piece], member.T_member_first
-                row = {"piece": member.piece, "group": number, "scan": piece.scan}
+                row: dict[str, Any] = {"piece": member.piece, "group": number, "scan": piece.scan}
                 row["points"] = len(piece.points)
                 row |= dict(zip("xyz", piece.center, strict=True)) | {"score": member.score}
                 rotation = Rotation.from_matrix(pose[:3, :3]).as_quat()
