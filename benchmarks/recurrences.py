@@ -17,6 +17,15 @@ from scipy.special import comb
 
 import surfsig
 
+RIGHT_ANGLE, RIGHT_DISTANCE = np.radians(5.0), 2e-3
+"""Radians and metres that a right pose is off at most: two and a half of the scans' point spacings."""
+HALF_TURNS = {
+    "bracket": [(1.0, 1.0, 1.0)],
+    "box": [(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)],
+    "egg": [(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)],
+}
+"""Of kinds without an axis of revolution, the rotations that change nothing: diagonals of matrices."""
+
 
 @dataclass(frozen=True)
 class Score:
@@ -77,6 +86,38 @@ def scored(scene: RecurrenceScene, found: surfsig.Recurrences) -> Score:
     return Score(adjusted_rand_index(group, kind), len(np.unique(group)), sorted(merged), alone)
 
 
+def trusted_poses(scene: RecurrenceScene, found: surfsig.Recurrences) -> tuple[int, int]:
+    """Count the poses on first pieces that are trusted, and those of them that are wrong.
+
+    A pose is right where it is within `RIGHT_ANGLE` and `RIGHT_DISTANCE`, at the object's middle, of one that
+    brings the first object onto the other. Surfaces of revolution have no right pose: theirs is never known.
+    """
+    own = [scene.object_of_point[piece.points] for piece in found.pieces]
+    object_of = [int(np.bincount(numbers[numbers >= 0]).argmax()) for numbers in own]
+    trusted = wrong = 0
+    for group in found.groups:
+        first = object_of[group.members[0].piece]
+        for member in group.members[1:]:
+            if member.trusted:
+                trusted += 1
+                wrong += not _is_right(scene, first, object_of[member.piece], member.T_member_first)
+    return trusted, wrong
+
+
+def _is_right(scene: RecurrenceScene, first: int, other: int, pose: NDArray[np.float64]) -> bool:
+    kind = scene.kind_of_object[first]
+    if scene.kind_of_object[other] != kind:
+        return False
+    for signs in HALF_TURNS.get(scene.kinds[kind], ()):
+        true = scene.poses[other] @ np.diag([*signs, 1.0]) @ np.linalg.inv(scene.poses[first])
+        turn = pose[:3, :3] @ true[:3, :3].T
+        angle = np.arccos(np.clip((np.trace(turn) - 1.0) / 2.0, -1.0, 1.0))
+        distance = np.linalg.norm((pose - true) @ scene.poses[first][:, 3])
+        if angle <= RIGHT_ANGLE and distance <= RIGHT_DISTANCE:
+            return True
+    return False
+
+
 def picture(scene: RecurrenceScene, found: surfsig.Recurrences, path: Path) -> None:
     """Draw the scan, its kinds beside the groups that were found; the same colour where they agree."""
     import matplotlib.pyplot as plt
@@ -122,10 +163,12 @@ def main() -> None:
         found = surfsig.find_recurrences(surfaces)
         end = time.perf_counter()
         score = scored(scene, found)
+        trusted, wrong = trusted_poses(scene, found)
         print(
             f"seed {seed}: adjusted Rand index {score.rand_index:.3f}, {score.groups} groups of "
             f"{len(scene.kinds)} kinds; "
             f"merged: {score.merged or 'none'}; alone: {score.alone or 'none'}; "
+            f"poses trusted: {trusted}, {wrong} of them wrong; "
             f"surfaces {middle - start:.1f} s, recurrences {end - middle:.1f} s",
             flush=True,
         )

@@ -70,7 +70,14 @@ from surfsig.odometry import (
     estimate_odometry,
 )
 from surfsig.point_cloud import PointCloud
-from surfsig.recurrences import EqualSurfaces, Piece, Recurrence, Recurrences, find_recurrences
+from surfsig.recurrences import (
+    EqualSurfaces,
+    Occurrence,
+    Piece,
+    Recurrence,
+    Recurrences,
+    find_recurrences,
+)
 from surfsig.registration import (
     Alternative,
     MultiwayRegistration,
@@ -139,6 +146,7 @@ __all__ = [
     "LibraryEntry",
     "LoopClosure",
     "MultiwayRegistration",
+    "Occurrence",
     "Odometry",
     "OdometrySettings",
     "Piece",

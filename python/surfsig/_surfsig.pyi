@@ -353,6 +353,26 @@ class RecurrenceSettings:
         fine_weights: Sequence[float] | None = None,
         planar_weight: float | None = None,
         round_spread: float | None = None,
+        radius_share: float | None = None,
+        rival_starts: int | None = None,
+        rival_proposals: int | None = None,
+        rival_rounds: int | None = None,
+        examined_points: int | None = None,
+        surface_points: int | None = None,
+        object_points: int | None = None,
+        symmetry_excess: float | None = None,
+        rival_distance: float | None = None,
+        rival_push: float | None = None,
+        rival_deficit: float | None = None,
+        rival_deviations: float | None = None,
+        least_explained: float | None = None,
+        free_space_excess: float | None = None,
+        doubted_free_space: float | None = None,
+        trusted_overlap: float | None = None,
+        doubted_disagreement: float | None = None,
+        mirrored_disagreement: float | None = None,
+        doubted_scale: float | None = None,
+        scale_deviations: float | None = None,
         seed: int | None = None,
     ) -> RecurrenceSettings: ...
     @property
@@ -434,6 +454,66 @@ class RecurrenceSettings:
     def round_spread(self) -> float:
         """Spread of the confirmed normals from which on a match counts fully."""
     @property
+    def radius_share(self) -> float:
+        """What counts as a radius of a patch when a pose is examined, in extents of the smaller piece."""
+    @property
+    def rival_starts(self) -> int:
+        """Other poses that are brought near, at most."""
+    @property
+    def rival_proposals(self) -> int:
+        """Poses that pairs of points propose as rivals, at most."""
+    @property
+    def rival_rounds(self) -> int:
+        """Rounds of random changes that bring a rival near."""
+    @property
+    def examined_points(self) -> int:
+        """Points of each piece by which a pose is examined."""
+    @property
+    def surface_points(self) -> int:
+        """Points of each piece that make its surface, at most."""
+    @property
+    def object_points(self) -> int:
+        """Points of all pieces of a group that show how the object looks, at most."""
+    @property
+    def symmetry_excess(self) -> float:
+        """By how much an object's share of points in free space may grow with a symmetry."""
+    @property
+    def rival_distance(self) -> float:
+        """Radii of a patch by which a rival moves points elsewhere, at least."""
+    @property
+    def rival_push(self) -> float:
+        """Radii of a patch by which a piece is pushed along motions that are weakly held."""
+    @property
+    def rival_deficit(self) -> float:
+        """What a rival explains less of what is seen with both poses, as a share, at least, to be refuted."""
+    @property
+    def rival_deviations(self) -> float:
+        """The same in its standard errors."""
+    @property
+    def least_explained(self) -> float:
+        """What a rival explains over what the best pose does, at least."""
+    @property
+    def free_space_excess(self) -> float:
+        """By how much a rival's share of points in free space may be larger than the best pose's."""
+    @property
+    def doubted_free_space(self) -> float:
+        """Share of points in free space from which on a pose is doubted."""
+    @property
+    def trusted_overlap(self) -> float:
+        """Share of both pieces' points that lie on the other piece, below which a pose is doubted."""
+    @property
+    def doubted_disagreement(self) -> float:
+        """Share of points in sight that disagree, from which on the mirror image is tried."""
+    @property
+    def mirrored_disagreement(self) -> float:
+        """What disagrees then, over what disagrees without, below which the mirror image is better."""
+    @property
+    def doubted_scale(self) -> float:
+        """Logarithm of a scale from which on it is doubted."""
+    @property
+    def scale_deviations(self) -> float:
+        """The same in its standard errors."""
+    @property
     def seed(self) -> int:
         """Seed of the random choices."""
     def __eq__(self, value: object, /) -> bool: ...
@@ -479,6 +559,13 @@ def judge_poses(
     settings: RecurrenceSettings | None = None,
     threads: int | None = None,
 ) -> list[float]: ...
+def examine_poses(
+    views: Sequence[PieceView],
+    poses: Sequence[tuple[tuple[int, int], NDArray[np.float64]]],
+    *,
+    settings: RecurrenceSettings | None = None,
+    threads: int | None = None,
+) -> list[dict[str, Any]]: ...
 
 @final
 class FindSettings:

@@ -12,9 +12,14 @@ DIGITS = 15
 """That float64 holds."""
 
 
+def finite_or_none(value: float) -> float | None:
+    """Give a number for JSON: None where it is not finite."""
+    return value if math.isfinite(value) else None
+
+
 def finite_rows(matrix: NDArray[np.float64]) -> list[list[float | None]]:
     """Give a matrix row by row, for JSON: None for what is not finite."""
-    return [[value if math.isfinite(value) else None for value in row] for row in matrix.tolist()]
+    return [[finite_or_none(value) for value in row] for row in matrix.tolist()]
 
 
 def decimals_of(value: float, error: float) -> int:

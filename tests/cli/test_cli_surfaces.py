@@ -148,6 +148,11 @@ def test_what_recurs(shell: Shell, tmp_path: Path) -> None:
     members = values["groups"][0]["members"]
     assert [member["piece"] for member in members] == [0, 1, 2, 3]
     assert [direction["motion"] for direction in values["groups"][0]["free_directions"]] == ["rotation"]
+    # A ball may be turned: only the first one's pose is what it is by definition.
+    assert [member["doubts"] for member in members] == [[], *[["free_directions"]] * 3]
+    assert [member["trusted"] for member in members] == [True, False, False, False]
+    assert members[1]["reasons"] == ["the overlap does not determine 1 motion"]
+    assert members[1]["scale"] == pytest.approx(1.0, abs=0.01)
     (equal,) = values["equal_surfaces"]
     first, other = (values["pieces"][number]["center"] for number in (0, 1))
     moved = np.array(members[1]["pose"]) @ [*first, 1.0]

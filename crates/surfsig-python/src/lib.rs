@@ -81,7 +81,9 @@ mod _surfsig {
     #[pymodule_export]
     use crate::primitive::{Primitive, fit_primitive};
     #[pymodule_export]
-    use crate::recurrences::{PieceView, RecurrenceSettings, align_pieces, judge_poses, refine_poses};
+    use crate::recurrences::{
+        PieceView, RecurrenceSettings, align_pieces, examine_poses, judge_poses, refine_poses,
+    };
     #[pymodule_export]
     use crate::registration::{
         RegistrationSettings, consistent_directions, free_directions, free_space_share, register,

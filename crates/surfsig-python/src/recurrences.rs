@@ -1,11 +1,15 @@
 //! Poses between pieces of scans, for Python.
 
+use crate::registration::{alternatives_to_python, free_directions_to_python};
 use crate::settings::settings_class;
 use crate::watched::watched;
 use crate::{invalid_input, rows, to_python};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
-use surfsig::{Monitor, OrientedScan, PieceAlignment, PieceSituation, PosesOfPair, RigidTransform};
+use pyo3::types::PyDict;
+use surfsig::{
+    ExaminedPose, Monitor, OrientedScan, PieceAlignment, PieceSituation, PosesOfPair, RigidTransform,
+};
 
 settings_class! {
     /// How poses between pieces are searched and judged, for experts; see `surfsig.find_recurrences`.
@@ -62,6 +66,46 @@ settings_class! {
         planar_weight: f64 = planar_weight,
         /// Spread of the confirmed normals from which on a match counts fully.
         round_spread: f64 = round_spread,
+        /// What counts as a radius of a patch when a pose is examined, in extents of the smaller piece.
+        radius_share: f64 = radius_share,
+        /// Other poses that are brought near, at most.
+        rival_starts: usize = rivals.proposals,
+        /// Poses that pairs of points propose as rivals, at most.
+        rival_proposals: usize = rival_proposals,
+        /// Rounds of random changes that bring a rival near.
+        rival_rounds: usize = rival_rounds,
+        /// Points of each piece by which a pose is examined.
+        examined_points: usize = examined_points,
+        /// Points of each piece that make its surface, at most.
+        surface_points: usize = surface_points,
+        /// Points of all pieces of a group that show how the object looks, at most.
+        object_points: usize = object_points,
+        /// By how much an object's share of points in free space may grow with a symmetry.
+        symmetry_excess: f64 = symmetry_excess,
+        /// Radii of a patch by which a rival moves points elsewhere, at least.
+        rival_distance: f64 = rivals.distance,
+        /// Radii of a patch by which a piece is pushed along motions that are weakly held.
+        rival_push: f64 = rivals.push,
+        /// What a rival explains less of what is seen with both poses, as a share, at least, to be refuted.
+        rival_deficit: f64 = rivals.deficit,
+        /// The same in its standard errors.
+        rival_deviations: f64 = rivals.deviations,
+        /// What a rival explains over what the best pose does, at least.
+        least_explained: f64 = least_explained,
+        /// By how much a rival's share of points in free space may be larger than the best pose's.
+        free_space_excess: f64 = free_space_excess,
+        /// Share of points in free space from which on a pose is doubted.
+        doubted_free_space: f64 = doubted_free_space,
+        /// Share of both pieces' points that lie on the other piece, below which a pose is doubted.
+        trusted_overlap: f64 = trusted_overlap,
+        /// Share of points in sight that disagree, from which on the mirror image is tried.
+        doubted_disagreement: f64 = doubted_disagreement,
+        /// What disagrees then, over what disagrees without, below which the mirror image is better.
+        mirrored_disagreement: f64 = mirrored_disagreement,
+        /// Logarithm of a scale from which on it is doubted.
+        doubted_scale: f64 = doubted_scale,
+        /// The same in its standard errors.
+        scale_deviations: f64 = scale_deviations,
         /// Seed of the random choices.
         seed: u64 = seed,
     }
@@ -189,6 +233,43 @@ pub fn judge_poses(
     let settings = RecurrenceSettings::with_threads(settings, threads);
     let work = |monitor: &Monitor| surfsig::judge_poses(&views, &poses, &settings, monitor);
     Ok(watched(py, None, None, work)?.into_iter().map(|found| found.score).collect())
+}
+
+/// Try to refute poses of pairs of pieces that follow each other; of each target its pose on the piece that its chain
+/// begins with, by the names of the crate's `ExaminedPose` and `PoseEvidence`.
+#[pyfunction]
+#[pyo3(signature = (views, poses, *, settings=None, threads=None))]
+pub fn examine_poses<'py>(
+    py: Python<'py>,
+    views: Vec<Py<PieceView>>,
+    poses: Vec<([usize; 2], PyReadonlyArray2<'py, f64>)>,
+    settings: Option<RecurrenceSettings>,
+    threads: Option<usize>,
+) -> PyResult<Vec<Bound<'py, PyDict>>> {
+    let views = core_views(&views);
+    let of_pair = |(pair, pose): &([usize; 2], _)| Ok((*pair, transform(pose)?));
+    let poses = poses.iter().map(of_pair).collect::<PyResult<Vec<_>>>()?;
+    let settings = RecurrenceSettings::with_threads(settings, threads);
+    let work = |monitor: &Monitor| surfsig::examine_poses(&views, &poses, &settings, monitor);
+    watched(py, None, None, work)?.iter().map(|found| examined_to_python(py, found)).collect()
+}
+
+fn examined_to_python<'py>(py: Python<'py>, found: &ExaminedPose) -> PyResult<Bound<'py, PyDict>> {
+    let result = PyDict::new(py);
+    let matrix = found.T_target_source.to_matrix();
+    result.set_item("T_target_source", matrix.as_flattened().to_pyarray(py).reshape([4, 4])?)?;
+    result.set_item("free_directions", free_directions_to_python(&found.free_directions))?;
+    result.set_item("alternatives", alternatives_to_python(&found.alternatives))?;
+    result.set_item("overlap", found.evidence.overlap)?;
+    result.set_item("explained", found.evidence.explained)?;
+    result.set_item("free_space", found.evidence.free_space)?;
+    result.set_item("scale", found.evidence.scale)?;
+    result.set_item("scale_standard_error", found.evidence.scale_standard_error)?;
+    let reasons: Vec<String> = found.doubts.iter().map(ToString::to_string).collect();
+    result.set_item("reasons", reasons)?;
+    let doubts: Vec<&str> = found.doubts.iter().map(surfsig::Doubt::name).collect();
+    result.set_item("doubts", doubts)?;
+    Ok(result)
 }
 
 fn transform(pose: &PyReadonlyArray2<'_, f64>) -> PyResult<RigidTransform> {

@@ -150,9 +150,7 @@ pub fn register<'py>(
     result.set_item("reasons", reasons)?;
     let doubts: Vec<&str> = found.doubts.iter().map(surfsig::Doubt::name).collect();
     result.set_item("doubts", doubts)?;
-    let alternative = |one: &Alternative| (one.T_target_source.to_matrix(), one.explained, one.free_space);
-    let alternatives: Vec<_> = found.alternatives.iter().map(alternative).collect();
-    result.set_item("alternatives", alternatives)?;
+    result.set_item("alternatives", alternatives_to_python(&found.alternatives))?;
     result.set_item("explained", found.explained)?;
     result.set_item("free_space", found.free_space)?;
     result.set_item("scale", found.scale)?;
@@ -202,6 +200,15 @@ pub fn free_directions_to_python(directions: &[FreeDirection]) -> Vec<FreeDirect
         FreeDirection::RotationAboutPoint { point } => ("rotation", None, Some(point)),
     };
     directions.iter().map(tuple).collect()
+}
+
+/// A transform T_target_source, what it explains, and its share of points in free space.
+type AlternativeTuple = ([[f64; 4]; 4], f64, f64);
+
+/// The arguments of `surfsig.Alternative`.
+pub fn alternatives_to_python(alternatives: &[Alternative]) -> Vec<AlternativeTuple> {
+    let tuple = |one: &Alternative| (one.T_target_source.to_matrix(), one.explained, one.free_space);
+    alternatives.iter().map(tuple).collect()
 }
 
 /// Directions (n, 3) of points (n, 3) that are all on one side of each piece of surface, which side is open.

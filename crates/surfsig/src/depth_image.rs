@@ -188,6 +188,14 @@ impl DepthImage {
         self
     }
 
+    /// The image of the mirror image of the scan, x to -x.
+    #[must_use]
+    pub(crate) fn mirrored(&self) -> Self {
+        let second_viewpoint = self.second_viewpoint.as_ref().map(|second| Box::new(second.mirrored()));
+        // Everything else is in the image's own axes.
+        Self { axes: self.axes.map(|[x, y, z]| [-x, y, z]), second_viewpoint, ..self.clone() }
+    }
+
     fn fill(&mut self, points: &[SurfacePlace], own: &[bool]) {
         let side = self.side;
         self.points = points.iter().map(|point| self.in_image_axes(point)).collect();

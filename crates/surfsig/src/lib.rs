@@ -114,8 +114,8 @@ pub use primitive::{
     Primitive, PrimitiveFitOptions, PrimitiveUncertainty, SurfaceKind, fit_primitive, fit_primitive_with,
 };
 pub use recurrences::{
-    OrientedScan, PieceAlignment, PieceSituation, PieceView, PosesOfPair, RecurrenceSettings, align_pieces,
-    judge_poses, refine_poses,
+    ExaminedPose, OrientedScan, PieceAlignment, PieceSituation, PieceView, PoseEvidence, PosesOfPair,
+    RecurrenceSettings, align_pieces, examine_poses, judge_poses, refine_poses,
 };
 pub use registration::{
     FaceSettings, FreeSpaceSettings, REGISTRATION_STEPS, Registration, RegistrationSettings,

@@ -89,7 +89,8 @@ def surfaces_command(
     none), surface_kind and point_class (1 plane, 2 cylinder, 3 sphere, 4 cone, 5 torus, 6 saddle, 7 edge,
     8 free form, 0 unknown), confidence (0 to 1), deviation (signed distance from its surface), and red,
     green, blue by surface. With --recurrences it has piece and recurrence, the numbers of what hangs
-    together and of the group of pieces that show the same object (-1 for none), and JSON has their poses.
+    together and of the group of pieces that show the same object (-1 for none), and JSON has their poses,
+    each with what is free, equal or of another size, and whether it is trusted.
     Pipes that are joined end to end, by elbows or where their axes meet, are rows of the table and
     pipe_runs of JSON.
 

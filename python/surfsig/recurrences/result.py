@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from surfsig.alignment.free_directions import FreeDirection
 from surfsig.recurrences.equal_surfaces import EqualSurfaces
+from surfsig.recurrences.occurrence import MEASURES, Occurrence
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,23 +40,38 @@ class Piece:
 class Recurrence:
     """Pieces that show the same object."""
 
-    pieces: list[int]
-    """The numbers of the pieces, the first ones first."""
-    poses: Array
-    """T_member_first, (m, 4, 4): what brings the first piece onto each; the identity for itself."""
-    scores: Array
-    """(m,): how well each agrees with the one that its pose was found by, 0 to 1; 1 for the first."""
+    members: list[Occurrence]
+    """Each piece with its pose on the first one, and how sure that is; the first one first."""
     free_directions: list[FreeDirection]
     """Motions along which the first piece slips over itself, its rims left aside: there, poses rest on rims
-    alone, or on nothing."""
+    alone, or on nothing. Those of each member are what it and the first one leave open together."""
+
+    @property
+    def pieces(self) -> list[int]:
+        """The numbers of the pieces, the first ones first."""
+        return [member.piece for member in self.members]
+
+    @property
+    def poses(self) -> Array:
+        """T_member_first, (m, 4, 4): what brings the first piece onto each; the identity for itself."""
+        return np.stack([member.T_member_first for member in self.members])
+
+    @property
+    def scores(self) -> Array:
+        """(m,): how well each agrees with the one that its pose was found by, 0 to 1; 1 for the first."""
+        return np.array([member.score for member in self.members])
 
     def __len__(self) -> int:
         """Return the number of members."""
-        return len(self.pieces)
+        return len(self.members)
 
     def __repr__(self) -> str:
         free = "; ".join(str(direction) for direction in self.free_directions) or "no free direction"
-        return f"Recurrence({len(self)} pieces {self.pieces}, score {self.scores.mean():.2f}, {free})"
+        trusted = sum(member.trusted for member in self.members[1:])
+        return (
+            f"Recurrence({len(self)} pieces {self.pieces}, score {self.scores.mean():.2f}, "
+            f"{trusted} of {len(self) - 1} poses trusted, {free})"
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -116,21 +132,23 @@ class Recurrences:
         Returns
         -------
         The names of the columns, and a row for each group: its number, what recurs, how often, the numbers of
-        the pieces or surfaces, the mean score or the size with its standard error, the free directions.
+        the pieces or surfaces, the mean score or the size with its standard error, the free directions, and
+        how many poses on the first piece are trusted.
         """
         several = len(self.labels) > 1
         rows = []
         for number, group in enumerate(self.groups):
             members = [(self.pieces[piece].scan, piece) for piece in group.pieces]
             score = f"score {group.scores[1:].mean():.2f}"
-            rows.append((f"{number}", "piece", members, score, group.free_directions))
+            trusted = f"{sum(member.trusted for member in group.members[1:])} of {len(group) - 1}"
+            rows.append((f"{number}", "piece", members, score, group.free_directions, trusted))
         for surfaces in self.equal_surfaces:
             size = ", ".join(
                 f"{name.replace('_', ' ')} {value:.4g} ± {surfaces.size_std[name]:.1g}"
                 for name, value in surfaces.size.items()
             )
-            rows.append(("", surfaces.kind, surfaces.members, size, surfaces.free_directions))
-        header = ("", "what", "times", "which", "how alike", "free directions")
+            rows.append(("", surfaces.kind, surfaces.members, size, surfaces.free_directions, ""))
+        header = ("", "what", "times", "which", "how alike", "free directions", "trusted")
         return header, [
             (
                 label,
@@ -139,8 +157,9 @@ class Recurrences:
                 " ".join(f"{scan}:{which}" if several else f"{which}" for scan, which in members),
                 alike,
                 "; ".join(map(str, free)) or "none",
+                trusted,
             )
-            for label, what, members, alike, free in rows
+            for label, what, members, alike, free, trusted in rows
         ]
 
     def values(self) -> dict[str, Any]:
@@ -149,8 +168,8 @@ class Recurrences:
         Returns
         -------
         dict
-            pieces (number, scan, points, surfaces, center); groups (members with piece, score and pose, which
-            is T_member_first row by row; free_directions); equal_surfaces (kind, size, size_std, members
+            pieces (number, scan, points, surfaces, center); groups (members with what `Occurrence.values`
+            gives; free_directions); equal_surfaces (kind, size, size_std, members
             with scan, surface and pose; free_directions).
         """
         return {
@@ -166,10 +185,7 @@ class Recurrences:
             ],
             "groups": [
                 {
-                    "members": [
-                        {"piece": piece, "score": float(score), "pose": pose.tolist()}
-                        for piece, score, pose in zip(group.pieces, group.scores, group.poses, strict=True)
-                    ],
+                    "members": [member.values() for member in group.members],
                     "free_directions": [direction.values() for direction in group.free_directions],
                 }
                 for group in self.groups
@@ -196,7 +212,8 @@ class Recurrences:
         -------
         pandas.DataFrame
             group, scan, points, x, y, z (its mean), score, qx, qy, qz, qw, tx, ty, tz (T_member_first: unit
-            quaternion, translation), free (the free directions in words).
+            quaternion, translation), free (the free directions in words), alternatives (their number), scale,
+            scale_standard_error, overlap, explained, free_space, trusted, reasons.
 
         Raises
         ------
@@ -210,15 +227,19 @@ class Recurrences:
         pandas = library("pandas", "pandas", "pandas")
         rows: list[dict[str, Any]] = []
         for number, group in enumerate(self.groups):
-            free = "; ".join(str(direction) for direction in group.free_directions)
-            for member, pose, score in zip(group.pieces, group.poses, group.scores, strict=True):
-                piece = self.pieces[member]
-                row = {"piece": member, "group": number, "scan": piece.scan, "points": len(piece.points)}
-                row |= dict(zip("xyz", piece.center, strict=True)) | {"score": score}
+            for member in group.members:
+                piece, pose = self.pieces[member.piece], member.T_member_first
+                row: dict[str, Any] = {"piece": member.piece, "group": number, "scan": piece.scan}
+                row["points"] = len(piece.points)
+                row |= dict(zip("xyz", piece.center, strict=True)) | {"score": member.score}
                 rotation = Rotation.from_matrix(pose[:3, :3]).as_quat()
                 row |= dict(zip(("qx", "qy", "qz", "qw"), rotation, strict=True))
-                row |= dict(zip(("tx", "ty", "tz"), pose[:3, 3], strict=True)) | {"free": free}
-                rows.append(row)
+                row |= dict(zip(("tx", "ty", "tz"), pose[:3, 3], strict=True))
+                row["free"] = "; ".join(map(str, member.free_directions))
+                row["alternatives"] = len(member.alternatives)
+                row |= {name: getattr(member, name) for name in MEASURES}
+                rows.append(row | {"trusted": member.trusted, "reasons": "; ".join(member.reasons)})
         names = ["piece", "group", "scan", "points", "x", "y", "z", "score"]
-        names += ["qx", "qy", "qz", "qw", "tx", "ty", "tz", "free"]
+        names += ["qx", "qy", "qz", "qw", "tx", "ty", "tz", "free", "alternatives"]
+        names += [*MEASURES, "trusted", "reasons"]
         return pandas.DataFrame(rows, columns=names).set_index("piece")

@@ -16,12 +16,12 @@ from surfsig.defaults import (
     RECURRENCE_SCORE,
 )
 from surfsig.errors import InvalidInputError
-from surfsig.geometry import rotate
 from surfsig.progress import ProgressCallback
 from surfsig.recurrences.equal_surfaces import equal_surfaces
-from surfsig.recurrences.grouping import best_match_tree, groups_of
+from surfsig.recurrences.examination import examined_members
+from surfsig.recurrences.grouping import groups_of
 from surfsig.recurrences.main_surface import main_surface
-from surfsig.recurrences.matching import Pairs, PieceMatcher, poses_from, scores_of
+from surfsig.recurrences.matching import PieceMatcher, scores_of
 from surfsig.recurrences.result import Piece, Recurrence, Recurrences
 from surfsig.recurrences.scan import ScanPieces
 from surfsig.surfaces import Surfaces
@@ -48,6 +48,10 @@ def find_recurrences(
     through, nor where it would have seen something, nor beneath what it stands on. So a half hidden piece
     matches a whole one. Shadows on the planes tell whether points had to be seen from a second viewpoint,
     as by the camera of a triangulation scanner. The result is always the same.
+
+    Each piece's pose on the first one of its group is then tried to be refuted, by the tests of `register`:
+    motions that are free, other poses that explain as much, points in free space, another size or hand. What
+    has survived is `trusted`; of a ball or a box no pose is, and `reasons` says so.
 
     Parameters
     ----------
@@ -104,39 +108,14 @@ def find_recurrences(
     matcher = PieceMatcher(views, signatures, mains, settings=settings, threads=workers)
     pairs = matcher.matched_pairs(tell)
     scores = scores_of(pairs, len(pieces))
-    centers = [
-        np.asarray(view.center) + scans[piece.scan].cloud.origin
-        for view, piece in zip(views, pieces, strict=False)
-    ]
-    groups = [
-        _recurrence(members, smooth[members[0]], pairs, scores, centers)
+    members = [
+        members
         for members in groups_of(scores, RECURRENCE_SCORE, matcher.agreement_with(pairs))
         if len(members) > 1
     ]
+    origins = [scans[piece.scan].cloud.origin for piece in pieces[: len(views)]]
+    examined = examined_members(members, pairs, scores, views, origins, settings=settings, threads=workers)
+    groups = [
+        Recurrence(occurrences, free_directions(*smooth[occurrences[0].piece])) for occurrences in examined
+    ]
     return Recurrences(groups, pieces, equal_surfaces(scans, RECURRENCE_CONFIDENCE), labels, scores)
-
-
-def _recurrence(
-    members: list[int],
-    smooth: tuple[Array, Array],
-    pairs: Pairs,
-    scores: Array,
-    centers: Sequence[Array],
-) -> Recurrence:
-    """Chain the poses of a group from its first member over the best matches.
-
-    `smooth` are places and normals of the first member, from balls in which noise counts little;
-    `centers` are where the coordinates of each piece start.
-    """
-    pose = poses_from(members[0], members, pairs, scores)
-    score = {end: float(scores[start, end]) for start, end in best_match_tree(members, scores)}
-    score[members[0]] = 1.0
-    for member in members:
-        pose[member][:3, 3] += centers[member] - rotate(pose[member], centers[members[0]])
-    free = free_directions(*smooth)
-    return Recurrence(
-        members,
-        np.stack([pose[member] for member in members]),
-        np.array([score[member] for member in members]),
-        free,
-    )

@@ -10,27 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfsig import cloud_transforms, geometry
+from surfsig.alignment.alternative import Alternative
 from surfsig.alignment.free_directions import FreeDirection
-from surfsig.digits import finite_rows, position_text
+from surfsig.digits import finite_or_none, finite_rows, position_text
 from surfsig.page import Layer, page_html, write_page
 from surfsig.point_cloud import PointCloud, coordinate_array
 
 Array = NDArray[np.float64]
 
 _BLUE, _ORANGE = (31, 119, 180), (255, 127, 14)
-
-
-@dataclass(frozen=True, eq=False)
-class Alternative:
-    """A transform that explains as much of the source as the best one."""
-
-    T_target_source: Array
-    """(4, 4): a point p of the source is at R p + t of the target."""
-    explained: float
-    """Share of the source that lies on the target's surface, near points counting more, 0 to 1."""
-    free_space: float
-    """The larger share of one scan's points in the free space of the other's sensor; NaN where no viewpoint
-    is known."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -216,25 +204,14 @@ class Registration:
             "matches": self.matches,
             "inliers": self.inliers,
             "overlap": self.overlap,
-            "rms": _known(self.rms),
+            "rms": finite_or_none(self.rms),
             "radius": self.radius,
             "trusted": self.trusted,
             "doubts": self.doubts,
             "reasons": self.reasons,
-            "alternatives": [
-                {
-                    "T_target_source": other.T_target_source.tolist(),
-                    "explained": other.explained,
-                    "free_space": _known(other.free_space),
-                }
-                for other in self.alternatives
-            ],
+            "alternatives": [other.values() for other in self.alternatives],
             "explained": self.explained,
-            "free_space": _known(self.free_space),
-            "scale": _known(self.scale),
-            "scale_standard_error": _known(self.scale_standard_error),
+            "free_space": finite_or_none(self.free_space),
+            "scale": finite_or_none(self.scale),
+            "scale_standard_error": finite_or_none(self.scale_standard_error),
         }
-
-
-def _known(value: float) -> float | None:
-    return value if np.isfinite(value) else None

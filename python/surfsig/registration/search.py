@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
 from surfsig._surfsig import RegistrationSettings
+from surfsig.alignment.alternative import Alternative
 from surfsig.alignment.free_directions import free_direction
 from surfsig.arguments import positive_length, progress_callback, thread_count, whole_number
 from surfsig.geometry import pose_array
 from surfsig.missing_returns import without_missing_returns
 from surfsig.orientation import orientation
 from surfsig.point_cloud import PointCloud
-from surfsig.registration.registration import Alternative, Registration
+from surfsig.registration.registration import Registration
 from surfsig.resolution import warn_if_too_coarse
 from surfsig.units import unit_mismatch
 

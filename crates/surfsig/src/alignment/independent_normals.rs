@@ -11,6 +11,9 @@ use super::observability::{FreeDirection, Motions, UNOBSERVABLE};
 use super::point_to_surface::PointToSurface;
 use nalgebra::Vector3;
 
+/// Voxels within which the normal of a voxel is that of a point: its own or a neighbouring one.
+pub(crate) const NORMAL_REACH: f64 = 2.0;
+
 /// From when on a surface holds a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct HeldLimits {

@@ -132,8 +132,8 @@ impl Motions {
 }
 
 /// Rotations and translations that span free motions, which are twists about `center` with rotations in units of
-/// `unit`.
-fn named(motions: &[Vector6<f64>], center: Vector3<f64>, unit: f64) -> Vec<FreeDirection> {
+/// `unit`: at most six, of unit length and square to each other.
+pub(super) fn named(motions: &[Vector6<f64>], center: Vector3<f64>, unit: f64) -> Vec<FreeDirection> {
     if motions.is_empty() {
         return Vec::new();
     }

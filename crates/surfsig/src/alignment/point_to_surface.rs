@@ -143,6 +143,10 @@ impl TargetSurface {
         &self.points
     }
 
+    pub fn voxel(&self) -> f64 {
+        self.voxel
+    }
+
     /// Of one point; `None` where the target has no surface.
     fn residual(
         &self,

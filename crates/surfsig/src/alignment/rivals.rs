@@ -12,8 +12,14 @@ pub(crate) trait FittedSurface: Sync {
     /// The transform that a start leads to; `None` where the source hardly meets the surface.
     fn fitted(&self, source: &[[f64; 3]], start: RigidTransform) -> Option<RigidTransform>;
 
-    /// How near points, in the surface's coordinates, lie to it.
-    fn closeness(&self, moved: &[[f64; 3]]) -> Closeness;
+    /// How near what a transform moves lies to the surface.
+    #[allow(non_snake_case)]
+    fn closeness(&self, source: &[[f64; 3]], T_target_source: &RigidTransform) -> Closeness;
+
+    /// Where that is of which `closeness` tells, for each: neighbours err alike.
+    fn places(&self, source: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        source.to_vec()
+    }
 }
 
 /// From when on a source counts as larger or smaller than the target. By default the logarithm of its scale must be half a
@@ -56,18 +62,13 @@ impl FittedTarget<'_> {
         let off = scale.ln().abs();
         let is_significant = off > limits.deviations * standard_error / scale && off > limits.doubted;
         let explains_more =
-            || best.deficit_of(&self.closeness(&found.points)).is_some_and(|(deficit, _)| deficit < 0.0);
+            || best.deficit_of(&self.closeness_of(&found.points)).is_some_and(|(deficit, _)| deficit < 0.0);
         let doubt = (is_significant && explains_more()).then_some(Doubt::Scale { scale, standard_error });
         (Some(found), doubt)
     }
-}
 
-impl FittedSurface for FittedTarget<'_> {
-    fn fitted(&self, source: &[[f64; 3]], start: RigidTransform) -> Option<RigidTransform> {
-        Some(self.surface.align(source, start, &self.fit)?.T_target_source)
-    }
-
-    fn closeness(&self, moved: &[[f64; 3]]) -> Closeness {
+    /// How near points, in the target's coordinates, lie to its surface.
+    pub fn closeness_of(&self, moved: &[[f64; 3]]) -> Closeness {
         let mut closeness = self.surface.closeness(moved, self.farthest, &self.fit);
         for (one, point) in closeness.iter_mut().zip(moved) {
             // What lies on the surface is seen, whatever the range image's pixels say.
@@ -76,6 +77,17 @@ impl FittedSurface for FittedTarget<'_> {
             }
         }
         closeness
+    }
+}
+
+impl FittedSurface for FittedTarget<'_> {
+    fn fitted(&self, source: &[[f64; 3]], start: RigidTransform) -> Option<RigidTransform> {
+        Some(self.surface.align(source, start, &self.fit)?.T_target_source)
+    }
+
+    #[allow(non_snake_case)]
+    fn closeness(&self, source: &[[f64; 3]], T_target_source: &RigidTransform) -> Closeness {
+        self.closeness_of(&T_target_source.transform_points(source))
     }
 }
 
@@ -167,7 +179,7 @@ pub(crate) struct Rivals<'a, S> {
 impl<S: FittedSurface> Rivals<'_, S> {
     /// What the best transform explains.
     pub fn explained(&self) -> Explained {
-        Explained::new(self.closeness(&self.T_target_source), self.source)
+        Explained::new(self.closeness(&self.T_target_source), &self.surface.places(self.source))
     }
 
     /// Whether another transform explains so much less that it is no chance.
@@ -176,7 +188,7 @@ impl<S: FittedSurface> Rivals<'_, S> {
     }
 
     fn closeness(&self, transform: &RigidTransform) -> Closeness {
-        self.surface.closeness(&transform.transform_points(self.source))
+        self.surface.closeness(self.source, transform)
     }
 
     /// The transform that a start leads to, and the share that it explains, if that is as much as the best one does, but

@@ -1,6 +1,7 @@
 //! Whether a source has another scale than the target: a similarity transform fitted to the distances from the surface.
 
 use super::clustered_covariance::{block_count, block_numbers};
+use super::observability::UNOBSERVABLE;
 use super::point_to_surface::{PointToSurfaceSettings, Residual, TargetSurface};
 use nalgebra::{SMatrix, SVector, Vector3};
 use rayon::prelude::*;
@@ -42,6 +43,10 @@ impl TargetSurface {
             let change = system.step()?;
             if step == settings.max_iterations || change.norm() < settings.epsilon {
                 let standard_error = system.standard_error(&points, &inliers)?;
+                // Noise of the normals seems to hold a scale that two planes or a cylinder do not.
+                if system.observability() <= UNOBSERVABLE {
+                    return None;
+                }
                 // What the points had to be enlarged by, the target is larger by.
                 let scale = (-logarithm).exp();
                 return Some(Scale { scale, standard_error: scale * standard_error, points });
@@ -106,6 +111,12 @@ impl Similarity {
         let change = -self.inverse * self.gradient / self.unit;
         let is_determined = self.is_determined && change.iter().all(|x| x.is_finite());
         is_determined.then(|| change * (LARGEST_STEP / change.amax()).min(1.0))
+    }
+
+    /// The root mean square of the distances that a change of the scale makes which rigid motions do not undo, over that
+    /// of its points' paths.
+    fn observability(&self) -> f64 {
+        1.0 / (self.inverse[(6, 6)] * self.rows.len() as f64).sqrt()
     }
 
     fn moved(&self, points: &[[f64; 3]], change: &SVector<f64, UNKNOWNS>) -> Vec<[f64; 3]> {

@@ -33,6 +33,18 @@ pub(crate) fn symmetries(
     moved: &[[f64; 3]],
     radius: f64,
 ) -> Vec<RigidTransform> {
+    partial_symmetries(target, normals, moved, radius, LEAST_SHARE)
+}
+
+/// The same of a surface of which a part may not have been seen, so that a motion brings less of the source near it:
+/// `least_share` of what is near without, at least.
+pub(crate) fn partial_symmetries(
+    target: &[[f64; 3]],
+    normals: &[[f64; 3]],
+    moved: &[[f64; 3]],
+    radius: f64,
+    least_share: f64,
+) -> Vec<RigidTransform> {
     let Some(axes) = axes_of_faces(normals) else { return Vec::new() };
     let [from, to] = [moved, target].map(|points| middle(points, &axes));
     let some: Vec<[f64; 3]> =
@@ -43,7 +55,7 @@ pub(crate) fn symmetries(
             |point: &&[f64; 3]| tree.nearest(motion.transform_point(**point), NEAR * radius).is_some();
         some.iter().filter(is_near).count()
     };
-    let least = LEAST_SHARE * share(&RigidTransform::identity()) as f64;
+    let least = least_share * share(&RigidTransform::identity()) as f64;
     let about = |rotation: &Rotation3<f64>, from: &Vector3<f64>| RigidTransform {
         rotation: rotation.into_inner(),
         translation: to - rotation * from,

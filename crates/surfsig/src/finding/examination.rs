@@ -3,14 +3,11 @@
 use super::FindSettings;
 use super::acceptance::Candidate;
 use crate::alignment::{
-    Doubt, FittedTarget, FreeDirection, GicpCloud, PointToSurface, PointToSurfaceSettings, Rivals,
-    ScaleLimits, TargetSurface, symmetries,
+    Doubt, FittedTarget, FreeDirection, GicpCloud, NORMAL_REACH, PointToSurface, PointToSurfaceSettings,
+    Rivals, ScaleLimits, TargetSurface, symmetries,
 };
 use crate::geometry::RigidTransform;
 use crate::random::some_of;
-
-/// Voxels within which the normal of a voxel is that of a point: its own or a neighbouring one.
-const NORMAL_REACH: f64 = 2.0;
 
 /// A candidate, fitted to the points of the scene that are its own.
 pub(super) struct Refined<'a> {

@@ -2,35 +2,30 @@
 //!
 //! A piece becomes a [`PieceView`] ([`piece_view`]): points, their pairs, and a depth image. Pairs of oriented points
 //! propose poses ([`point_pairs`]); those with which what the sensor saw of both pieces agrees ([`agreement`]) are
-//! changed at random, judged by more points ([`pose_search`]) and fitted by least squares ([`refinement`]).
+//! changed at random, judged by more points ([`pose_search`]) and fitted by least squares ([`refinement`]). Poses that are
+//! kept are then tried to be refuted ([`examination`], [`rival_search`]), one after the other from piece to piece
+//! ([`chain`]), and all pieces of a group tell whether their object looks the same after a motion ([`object_symmetry`]).
 
 mod agreement;
+mod chain;
+mod examination;
+mod object_symmetry;
 mod piece_view;
 mod point_pairs;
 mod pose_search;
 mod refinement;
+mod result;
+mod rival_search;
 mod settings;
 
 pub use piece_view::{OrientedScan, PieceSituation, PieceView};
+pub use result::{ExaminedPose, PieceAlignment, PoseEvidence};
 pub use settings::RecurrenceSettings;
 
-use crate::depth_image::Judgement;
 use crate::geometry::RigidTransform;
 use crate::{Error, Monitor, with_threads};
 use agreement::PiecePair;
 use rayon::prelude::*;
-
-/// How well one piece lies on another.
-#[allow(non_snake_case)]
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PieceAlignment {
-    /// Takes points of the source, about its centre, to the target, about its own.
-    pub T_target_source: RigidTransform,
-    /// Of the source's points in the target's depth image, and the other way round.
-    pub judgements: [Judgement; 2],
-    /// 1 where all is seen from both sides and agrees; 0 and below where nothing speaks for a match.
-    pub score: f64,
-}
 
 /// Aligns pairs of pieces, given by the numbers of the source and of the target; `None` where no pose is any good.
 ///
@@ -152,6 +147,53 @@ pub fn judge_poses(
     monitor: &Monitor,
 ) -> Result<Vec<PieceAlignment>, Error> {
     of_pairs(views, poses, |of| of.0, settings, monitor, |pair, of| pose_search::measured(pair, &of.1))
+}
+
+/// Tries to refute poses T_target_source of pairs of pieces that follow each other: free motions, other poses that explain
+/// as much, points in free space, another size or hand. Of each target the pose on the piece that its chain begins with.
+///
+/// The source of a pair is the target of an earlier one, or the beginning of a chain. Seeds, threads and the monitor are
+/// as in [`align_pieces`].
+///
+/// # Errors
+/// [`Error::PieceOutOfRange`], [`Error::Threads`], [`Error::Cancelled`].
+///
+/// ```
+/// use surfsig::{examine_poses, Monitor, OrientedScan, PieceSituation, PieceView, RecurrenceSettings};
+/// use surfsig::RigidTransform;
+///
+/// // A square of 20 points by 20, which lies on itself.
+/// let points: Vec<[f64; 3]> = (0..400).map(|i| [f64::from(i % 20), f64::from(i / 20), 0.0]).collect();
+/// let normals = vec![[0.0, 0.0, 1.0]; 400];
+/// let scan = OrientedScan { points: &points, normals: &normals, spacing: 1.0, tolerance: 0.4 };
+/// let seen = PieceSituation { viewpoint: [10.0, 10.0, 1000.0], ..Default::default() };
+/// let settings = RecurrenceSettings::default();
+/// let piece: Vec<usize> = (0..400).collect();
+/// let view = PieceView::new(&scan, &piece, &seen, 1.0, &settings)?;
+/// let poses = [([0, 1], RigidTransform::identity())];
+/// let found = examine_poses(&[&view, &view], &poses, &settings, &Monitor::default())?;
+/// assert_eq!(found[0].free_directions.len(), 3, "a plane slides and rotates");
+/// assert_eq!(found[0].doubts[0].name(), "free_directions");
+/// # Ok::<(), surfsig::Error>(())
+/// ```
+pub fn examine_poses(
+    views: &[&PieceView],
+    poses: &[([usize; 2], RigidTransform)],
+    settings: &RecurrenceSettings,
+    monitor: &Monitor,
+) -> Result<Vec<ExaminedPose>, Error> {
+    // Unlike the keys of `align` and of refinements.
+    let key = |[source, target]: [usize; 2]| [settings.seed, source as u64, target as u64, 2];
+    let examined =
+        of_pairs(views, poses, |of| of.0, settings, monitor, |pair, of| pair.examined(&of.1, &key(of.0)))?;
+    let mut found: Vec<ExaminedPose> = Vec::with_capacity(poses.len());
+    for (number, (([source, target], pose), examination)) in poses.iter().zip(examined).enumerate() {
+        let before = poses[..number].iter().rposition(|other| other.0[1] == *source);
+        let pair = PiecePair { source: views[*source], target: views[*target], settings };
+        found.push(chain::chained(&pair, pose, examination, before.map(|number| &found[number])));
+    }
+    with_threads(settings.threads, || chain::with_symmetries(views, poses, &mut found, settings))?;
+    Ok(found)
 }
 
 /// Does work for each item that belongs to a pair of pieces.

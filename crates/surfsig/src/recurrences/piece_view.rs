@@ -72,6 +72,8 @@ pub struct PieceView {
     /// Largest distance of the piece's points from the centre.
     pub(super) extent: f64,
     pub(super) tolerance: f32,
+    /// Distance between `points`.
+    pub(super) voxel: f64,
 }
 
 impl PieceView {
@@ -123,7 +125,8 @@ impl PieceView {
             place: from_center(points[number]).map(|x| x as f32).into(),
             normal: normals[number].map(|x| x as f32),
         };
-        let mut judged = thinned(&local, settings.spacings_per_voxel * scan.spacing)?;
+        let voxel = settings.spacings_per_voxel * scan.spacing;
+        let mut judged = thinned(&local, voxel)?;
         Generator::new(&[piece.len() as u64]).shuffled(&mut judged, usize::MAX);
         let paired = thinned(&local, extent / settings.pair_voxels_per_extent)?;
         let paired: Vec<_> = paired.iter().map(|&k| (local[k], normals[piece[k]])).collect();
@@ -154,7 +157,26 @@ impl PieceView {
             center: center.into(),
             extent,
             tolerance: scan.tolerance as f32,
+            voxel,
         })
+    }
+
+    /// The mirror image of the piece and of what is around it, x to -x.
+    pub(super) fn mirrored(&self) -> Self {
+        let mirror = |[x, y, z]: [f32; 3]| [-x, y, z];
+        let mirrored =
+            |point: &SurfacePlace| SurfacePlace { place: mirror(point.place), normal: mirror(point.normal) };
+        Self {
+            points: self.points.iter().map(mirrored).collect(),
+            pairs: self.pairs.mirrored(),
+            image: self.image.mirrored(),
+            ..*self
+        }
+    }
+
+    /// The places of the first `most` points.
+    pub(super) fn places(&self, most: usize) -> Vec<[f64; 3]> {
+        self.points.iter().take(most).map(|point| point.place.map(f64::from)).collect()
     }
 
     /// The mean of the piece's points, in the scan: the origin of poses.

@@ -44,6 +44,13 @@ impl PointPairs {
         Self { points, pairs, features, tree }
     }
 
+    /// Those of the mirror image, x to -x: their features are the same.
+    pub fn mirrored(&self) -> Self {
+        let mirror = |[x, y, z]: [f64; 3]| [-x, y, z];
+        let points = self.points.iter().map(|&(point, normal)| (mirror(point), mirror(normal))).collect();
+        Self { points, ..self.clone() }
+    }
+
     fn frame(&self, pair: usize) -> RigidTransform {
         let [first, second] = self.pairs[pair].map(|number| &self.points[number as usize]);
         pair_frame(first, second)

@@ -64,7 +64,7 @@ pub(super) fn measured(pair: &PiecePair<'_>, pose: &RigidTransform) -> PieceAlig
 }
 
 /// The poses, and changes of each at random: a rotation about the target's centre, and a translation.
-fn mutated(
+pub(super) fn mutated(
     mut poses: Vec<RigidTransform>,
     target: &PieceView,
     round: usize,

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 const MIN_CORRESPONDENCES: usize = 6;
 
 /// A point, a unit normal, and the point's distance along it; see [`LinearisedDistances`].
-type Row = (Vector3<f64>, Vector3<f64>, f64);
+pub(super) type Row = (Vector3<f64>, Vector3<f64>, f64);
 
 impl PiecePair<'_> {
     /// A pose after some steps of point to plane, by the first points of each piece on the surface of the other.
@@ -31,7 +31,7 @@ impl PiecePair<'_> {
     }
 
     /// Of points of both pieces, the distances to the surface of the other, in the target's axes.
-    fn residuals(&self, pose: &RigidTransform, points: usize) -> Vec<Row> {
+    pub fn residuals(&self, pose: &RigidTransform, points: usize) -> Vec<Row> {
         let (source, target) = (self.source, self.target);
         let ours = &source.points[..points.min(source.points.len())];
         let theirs = &target.points[..points.min(target.points.len())];

@@ -1,5 +1,7 @@
 //! How poses between pieces are searched and judged.
 
+use crate::alignment::{PointToSurfaceSettings, RivalSettings, ScaleLimits};
+
 /// What an expert may change; nothing has to be set. All values were chosen on seeds 1 to 6 of
 /// `benchmarks/recurrences.py`, unless their description says otherwise.
 ///
@@ -69,6 +71,46 @@ pub struct RecurrenceSettings {
     /// Spread of the confirmed normals (1 less the largest eigenvalue of their second moments) from which on a match
     /// counts fully.
     pub round_spread: f64,
+    /// What counts as a radius of a patch when a pose is examined, in extents of the smaller piece: as of a registered
+    /// scan.
+    pub radius_share: f64,
+    /// When another pose explains as much of what both sensors saw; so many proposals are brought near.
+    pub rivals: RivalSettings,
+    /// Poses that pairs of points propose as rivals, at most: what explains as much as the best pose is proposed as
+    /// often, so that a part of `proposals` is enough.
+    pub rival_proposals: usize,
+    /// Rounds of random changes that bring a rival near.
+    pub rival_rounds: usize,
+    /// Points of each piece by which a pose is examined: shares of 400 have a standard error of 0.025 at most.
+    pub examined_points: usize,
+    /// Points of each piece that make its surface, at most, which tells free directions and the scale.
+    pub surface_points: usize,
+    /// Points of all pieces of a group that show how the object looks, at most.
+    pub object_points: usize,
+    /// By how much an object's share of points in free space may grow with a motion after which it looks the same, and
+    /// what may not be explained any more: poses of all pieces err.
+    pub symmetry_excess: f64,
+    /// What a rival explains over what the best pose does, at least: with a half turn two sensors that saw three faces
+    /// of a box have one or two in common.
+    pub least_explained: f64,
+    /// How points are fitted to the surface of another piece, which tells free directions and the scale.
+    pub point_to_surface: PointToSurfaceSettings,
+    /// Distance from the surface, in radii, from which pieces of another size are fitted: as in finding.
+    pub rival_distance: f64,
+    /// By how much a rival's share of points in free space may be larger than the best pose's: as in registration.
+    pub free_space_excess: f64,
+    /// Share of points in free space from which on a pose is doubted.
+    pub doubted_free_space: f64,
+    /// Share of both pieces' points that lie on the other piece, below which a pose is doubted.
+    pub trusted_overlap: f64,
+    /// Share of points in sight that disagree, from which on the source's mirror image is tried.
+    pub doubted_disagreement: f64,
+    /// What disagrees then, over what disagrees without, below which the mirror image is the better one.
+    pub mirrored_disagreement: f64,
+    /// The logarithm of a scale from which on it is doubted, as in registration.
+    pub doubted_scale: f64,
+    /// The same in its standard errors.
+    pub scale_deviations: f64,
     /// Seed of the random choices; the same one gives the same poses.
     pub seed: u64,
     /// Number of threads; all cores where it is `None`. The result is the same, bit for bit.
@@ -104,6 +146,24 @@ impl Default for RecurrenceSettings {
             fine_weights: [15.0, 40.0],
             planar_weight: 0.7,
             round_spread: 0.1,
+            radius_share: 0.4,
+            rivals: RivalSettings { proposals: 4, ..Default::default() },
+            rival_proposals: 600,
+            rival_rounds: 2,
+            examined_points: 400,
+            surface_points: 1500,
+            object_points: 800,
+            symmetry_excess: 0.05,
+            least_explained: 0.25,
+            point_to_surface: PointToSurfaceSettings::default(),
+            rival_distance: 0.55,
+            free_space_excess: 0.01,
+            doubted_free_space: 0.02,
+            trusted_overlap: 0.2,
+            doubted_disagreement: 0.02,
+            mirrored_disagreement: 0.5,
+            doubted_scale: ScaleLimits::DEFAULT.doubted,
+            scale_deviations: ScaleLimits::DEFAULT.deviations,
             seed: 0,
             threads: None,
         }

@@ -3,14 +3,11 @@
 use super::free_space::BothSensors;
 use super::settings::RegistrationSettings;
 use crate::alignment::{
-    Alternative, Doubt, FittedTarget, FreeDirection, GicpCloud, PointToSurface, RivalSettings, Rivals,
-    ScaleLimits, TargetSurface, symmetries,
+    Alternative, Doubt, FittedTarget, FreeDirection, GicpCloud, NORMAL_REACH, PointToSurface, RivalSettings,
+    Rivals, ScaleLimits, TargetSurface, symmetries,
 };
 use crate::geometry::RigidTransform;
 use crate::random::some_of;
-
-/// Voxels within which the normal of a scan's voxel is that of a point: its own or a neighbouring one.
-const NORMAL_REACH: f64 = 2.0;
 
 /// Two scans about their middles, of which transforms are judged.
 pub(super) struct Judge<'a> {
