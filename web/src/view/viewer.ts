@@ -1,34 +1,14 @@
 /** The view: a camera that turns about the points, eye-dome lighting, and as many points as are drawn smoothly. */
 
-import {
-  DepthTexture,
-  type Object3D,
-  OrthographicCamera,
-  PerspectiveCamera,
-  Mesh,
-  NearestFilter,
-  PlaneGeometry,
-  Scene,
-  ShaderMaterial,
-  Sphere,
-  Box3,
-  UnsignedIntType,
-  Vector2,
-  Vector3,
-  WebGLRenderer,
-  WebGLRenderTarget,
-  Color,
-} from "three";
+import { Box3, type Object3D, PerspectiveCamera, Scene, Sphere, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Vector } from "../files/cloud.js";
 import { MOST, Pace } from "./pace.js";
 import { inView, pick, type Picked, projector } from "./pick.js";
 import { onePoint } from "./layer.js";
 import { PointLayer } from "./points.js";
-import { EYE_DOME_FRAGMENT, FEW_RINGS, RINGS, SCREEN_VERTEX } from "./shaders.js";
+import { Screen } from "./screen.js";
 
-/** Darkness of an edge, per power of two by which its other side is nearer. */
-const EYE_DOME = 18;
 /** Width of the view, in widths of what it shows. */
 const MARGIN = 1.06;
 /** Milliseconds without a motion after which all are drawn. */
@@ -51,12 +31,6 @@ interface Picture {
   points: number;
 }
 
-function newTarget(): WebGLRenderTarget {
-  const target = new WebGLRenderTarget(1, 1, { minFilter: NearestFilter, magFilter: NearestFilter });
-  target.depthTexture = new DepthTexture(1, 1, UnsignedIntType);
-  return target;
-}
-
 /** What a link keeps of the view. */
 export interface ViewState {
   position: Vector;
@@ -69,16 +43,11 @@ export class Viewer {
   /** Where the view's 0 is, in the coordinates of the file. */
   origin: Vector = [0, 0, 0];
   onDrawn: (drawn: number, total: number) => void = () => undefined;
-  private readonly renderer: WebGLRenderer;
+  private readonly screen: Screen;
   private readonly controls: OrbitControls;
   private readonly scene = new Scene();
   private readonly overlays: Object3D[] = [];
   private readonly pace: Pace;
-  /** What is shown, and where the next picture is drawn meanwhile. */
-  private targets: [WebGLRenderTarget, WebGLRenderTarget];
-  private readonly screen = new Scene();
-  private readonly screenCamera = new OrthographicCamera(-1, 1, 1, -1, 0, 1);
-  private readonly eyeDome: ShaderMaterial;
   private sphere = new Sphere(new Vector3(), 1);
   private lastMotion = -Infinity;
   private requested = false;
@@ -92,32 +61,13 @@ export class Viewer {
   private diameter = 1;
   private sizeFactor = 1;
 
-  constructor(private readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: false, preserveDrawingBuffer: true });
-    this.renderer.autoClear = false;
-    this.pace = new Pace(this.renderer.getContext() as WebGL2RenderingContext);
+  constructor(canvas: HTMLCanvasElement) {
+    this.screen = new Screen(canvas);
+    this.pace = new Pace(this.screen.context);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.zoomToCursor = true;
     this.controls.addEventListener("change", () => this.moved());
-    this.targets = [newTarget(), newTarget()];
-    this.eyeDome = new ShaderMaterial({
-      vertexShader: SCREEN_VERTEX,
-      fragmentShader: EYE_DOME_FRAGMENT,
-      depthTest: false,
-      depthWrite: false,
-      uniforms: {
-        colours: { value: null },
-        depths: { value: null },
-        pixel: { value: new Vector2() },
-        near: { value: 1 },
-        far: { value: 1 },
-        strength: { value: EYE_DOME },
-        rings: { value: RINGS },
-        background: { value: new Color() },
-      },
-    });
-    this.screen.add(new Mesh(new PlaneGeometry(2, 2), this.eyeDome));
     new ResizeObserver(() => this.resized()).observe(canvas);
     this.resized();
     setTimeout(() => this.prepare(), PREPARATION);
@@ -127,31 +77,20 @@ export class Viewer {
   private prepare(): void {
     if (this.layers.length > 0) return;
     this.scene.add(this.firstPoint.group);
-    this.renderer.setRenderTarget(this.targets[1]);
-    this.renderer.render(this.scene, this.camera);
+    this.screen.draw(this.scene, this.camera);
     this.scene.remove(this.firstPoint.group);
   }
 
-  get size(): { width: number; height: number } {
-    return { width: this.canvas.clientWidth || 1, height: this.canvas.clientHeight || 1 };
-  }
-
   private resized(): void {
-    const { width, height } = this.size;
-    const ratio = Math.min(window.devicePixelRatio, 2);
-    this.renderer.setPixelRatio(ratio);
-    this.renderer.setSize(width, height, false);
-    for (const target of this.targets) target.setSize(width * ratio, height * ratio);
-    this.eyeDome.uniforms.pixel.value.set(1 / width, 1 / height);
+    this.screen.resize();
+    const { width, height } = this.screen.size;
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     this.render();
   }
 
   setBackground(css: string): void {
-    // Colours are drawn as they are, without conversion.
-    const [r, g, b] = (css.match(/\d+(\.\d+)?/g) ?? ["255", "255", "255"]).map(Number);
-    this.eyeDome.uniforms.background.value.setRGB(r / 255, g / 255, b / 255);
+    this.screen.setBackground(css);
     this.render();
   }
 
@@ -189,7 +128,7 @@ export class Viewer {
   }
 
   setShading(eyeDome: boolean, normals: boolean): void {
-    this.eyeDome.uniforms.strength.value = eyeDome ? EYE_DOME : 0;
+    this.screen.setEyeDome(eyeDome);
     for (const { material } of this.layers) material.uniforms.shading.value = normals ? 1 : 0;
     this.render();
   }
@@ -259,18 +198,18 @@ export class Viewer {
   }
 
   pick(x: number, y: number): Picked | null {
-    const { width, height } = this.size;
+    const { width, height } = this.screen.size;
     return pick(this.visible, this.camera, width, height, x, y);
   }
 
   inView(layer: PointLayer): Uint32Array<ArrayBuffer> {
-    const { width, height } = this.size;
+    const { width, height } = this.screen.size;
     return inView(layer, this.camera, width, height);
   }
 
   /** Where a point is on the screen, in pixels; null behind the viewer. */
   onScreen(layer: PointLayer, point: number): [number, number] | null {
-    const { width, height } = this.size;
+    const { width, height } = this.screen.size;
     const seen = projector(layer, this.camera, width, height)(point, new Vector3());
     return seen.z > 0 ? [seen.x, seen.y] : null;
   }
@@ -364,7 +303,7 @@ export class Viewer {
   }
 
   private get pixelsPerUnit(): number {
-    const height = this.size.height * this.renderer.getPixelRatio();
+    const height = this.screen.size.height * this.screen.pixelRatio;
     return height / (2 * Math.tan((this.camera.fov * Math.PI) / 360));
   }
 
@@ -377,11 +316,10 @@ export class Viewer {
         (this.diameter * this.sizeFactor) / Math.sqrt(Math.max(share, LEAST_SHARE));
       material.uniforms.leastSize.value = Math.max(
         1,
-        1.4 * this.renderer.getPixelRatio() * Math.min(this.sizeFactor, 3),
+        1.4 * this.screen.pixelRatio * Math.min(this.sizeFactor, 3),
       );
     }
-    this.renderer.setRenderTarget(this.targets[1]);
-    this.renderer.clear();
+    this.screen.begin();
   }
 
   /** Draws the next points into the picture that was begun, until it has a share of them; returns how many. */
@@ -392,21 +330,13 @@ export class Viewer {
     });
     picture.drawn = until;
     picture.points += points;
-    this.renderer.setRenderTarget(this.targets[1]);
-    this.renderer.render(this.scene, this.camera);
+    this.screen.draw(this.scene, this.camera);
     return points;
   }
 
   /** Shows the picture that was drawn. */
   private show(points: number, isWhole: boolean): void {
-    this.targets.reverse();
-    const [{ texture, depthTexture }] = this.targets;
-    const { uniforms } = this.eyeDome;
-    uniforms.colours.value = texture;
-    uniforms.depths.value = depthTexture;
-    uniforms.rings.value = uniforms.strength.value === 0 ? 0 : isWhole ? RINGS : FEW_RINGS;
-    this.renderer.setRenderTarget(null);
-    this.renderer.render(this.screen, this.screenCamera);
+    this.screen.show(this.camera, isWhole);
     this.onDrawn(
       points,
       this.visible.reduce((sum, { layer }) => sum + layer.count, 0),
@@ -425,20 +355,15 @@ export class Viewer {
     this.camera.near = near;
     this.camera.far = far;
     this.camera.updateProjectionMatrix();
-    this.eyeDome.uniforms.near.value = near;
-    this.eyeDome.uniforms.far.value = far;
   }
 
   /** The picture as a PNG file. */
   picture(): Promise<Blob> {
     const whole = this.newPicture();
+    // What was begun out of sight is gone.
+    this.refinement = null;
     this.begin(whole.share);
     this.show(this.drawPart(whole, whole.share), true);
-    return new Promise((resolve, reject) => {
-      this.canvas.toBlob(
-        (blob) => (blob === null ? reject(new Error("no picture")) : resolve(blob)),
-        "image/png",
-      );
-    });
+    return this.screen.picture();
   }
 }
