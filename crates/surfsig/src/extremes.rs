@@ -1,7 +1,7 @@
 //! The larger and the smaller of two numbers, by one comparison.
 //!
 //! `f32::max` gives the other number where one is NaN. WebAssembly has no instruction for that, so that it calls a
-//! function there, which took a fourteenth of an extraction's time.
+//! function there, which is slow in loops over points.
 
 /// The larger of two numbers that are not NaN.
 #[inline(always)]

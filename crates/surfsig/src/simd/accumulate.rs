@@ -154,7 +154,7 @@ const HEIGHT_SQUARE: [usize; 8] = [
 ];
 
 /// One pass over the block: `terms` adds the products of `WIDTH` points to their sums. It names each of these: a loop
-/// over them is not unrolled in WebAssembly, and took half of an extraction's time.
+/// over them is not unrolled in WebAssembly, and took four times as long.
 ///
 /// `WIDTH` hardware lanes take their share of the virtual ones in turn, which keeps the sums in
 /// registers.

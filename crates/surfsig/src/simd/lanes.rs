@@ -85,7 +85,7 @@ impl Lanes {
     }
 }
 
-/// WebAssembly's vectors of two: the compiler leaves a third of the plain loops as they are.
+/// WebAssembly's vectors of two: of the plain loops the compiler leaves some as they are.
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 impl Lanes {
     #[inline(always)]
