@@ -46,7 +46,7 @@ PYTHON_EXCEPTIONS = {
 }
 
 RUST_FLOORS = (
-    ("error", "multiply_add"),
+    ("error", "extremes", "multiply_add"),
     (
         "statistics",
         "geometry",

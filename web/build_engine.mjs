@@ -38,7 +38,7 @@ const found = toolchain();
 if (found === null) {
   process.stderr.write(
     `the engine needs Rust's target ${TARGET}: install rustup (https://rustup.rs), which fetches it, ` +
-      "or Debian's packages rustc-web, rust-web-src and lld\n",
+      "or Debian's packages cargo-web, rustc-web, rust-web-src and lld\n",
   );
   process.exit(3);
 }

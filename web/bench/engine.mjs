@@ -37,8 +37,8 @@ function seconds(work) {
   return (user + system) / 1e6;
 }
 
-const extract = () => cloud.extract(Number(radius), null, () => true);
+let count;
+const extract = () => ({ count } = cloud.extract(Number(radius), null, () => true));
 const [first, second, third] = [extract, extract, extract].map(seconds);
-const { count } = extract();
 const neighbours = count.reduce((sum, n) => sum + n, 0) / count.length;
 process.stdout.write(JSON.stringify({ first, again: Math.min(second, third), neighbours }));

@@ -25,6 +25,9 @@ const CLOSED = 3.8;
 /** Points up to which curvature is computed as soon as a file is there. */
 const MOST_AT_ONCE = 1_500_000;
 
+/** Milliseconds that the first picture may keep all else waiting. */
+const FIRST_PICTURE = 1500;
+
 export class Application implements Actions {
   private readonly state = initialState();
   private readonly frame: Frame;
@@ -99,6 +102,9 @@ export class Application implements Actions {
     this.setQuantity(cloud.colours === null ? "height" : "file");
     const generation = this.generation;
     await this.run("Measuring the spacing", async (engine) => {
+      // On few processors the engine would else be ahead of the first picture.
+      await viewer.drawn(FIRST_PICTURE);
+      if (generation !== this.generation) return;
       const { positions, origin, viewpoint } = cloud;
       const { spacing } = await engine.ask({ kind: "load", positions, origin, viewpoint });
       if (generation !== this.generation) return;
@@ -148,10 +154,7 @@ export class Application implements Actions {
     this.painter.setStage(1);
     this.viewer.fit();
     if (this.drawn !== null) {
-      const size = this.drawn.box.getSize(this.viewer.camera.position.clone());
-      this.viewer.setPointSize(
-        (1.6 * Math.hypot(size.x, size.y)) / Math.sqrt(Math.max(1, this.drawn.layer.count)),
-      );
+      this.viewer.setPointSize(this.drawn.closedDiameter);
       const known = quantitiesOf(this.drawn.layer).some(({ id }) => id === report.quantity);
       this.setQuantity(known ? report.quantity : "plain");
     }
@@ -167,6 +170,8 @@ export class Application implements Actions {
     this.viewer.origin = layer.origin;
     this.drawn = new PointLayer(layer, layer.origin);
     this.viewer.add(this.drawn);
+    // Until the spacing is known.
+    this.viewer.setPointSize(this.drawn.closedDiameter);
     this.painter.reset();
   }
 
@@ -349,5 +354,6 @@ export class Application implements Actions {
 
   private update(): void {
     this.frame.update();
+    this.painter.placeMarks();
   }
 }

@@ -191,7 +191,6 @@ export function frame(root: HTMLElement, state: State, actions: Actions): Frame 
       for (const panel of panels) panel.update();
       if (inReport)
         for (const id of ["surfaces", "curvature"]) aside.querySelector<HTMLElement>(`#${id}`)!.hidden = true;
-      viewer?.render();
     },
   };
 }

@@ -75,7 +75,8 @@ export class Painter {
     return layer.stage === "before" ? this.stage < 0.5 : this.stage >= 0.5;
   }
 
-  private placeMarks(): void {
+  /** Puts the marks where the clicked points are on the screen. */
+  placeMarks(): void {
     const drawn = this.viewer.layers.find(({ layer }) => layer === this.state.layer);
     const { first, second } = this.state;
     const at = (point: number | null): [number, number] | null =>

@@ -1,7 +1,7 @@
 /** The page in Chromium: values beside Python's, clicks, files, messages, keys. */
 
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
+import { readFileSync, writeFileSync } from "node:fs";
 import path from "node:path";
 import { pathToFileURL } from "node:url";
 import { after, before, describe, test } from "node:test";
@@ -112,6 +112,34 @@ describe("the page in Chromium", { concurrency: 2, skip: reason !== null && reas
     assert.equal(await page.locator('#surface-table tr[aria-selected="true"]').count(), 0);
     await page.mouse.click(view.x + 0.29 * view.width, view.y + 0.5 * view.height);
     await page.waitForSelector('#surface-table tr[aria-selected="true"]');
+    assert.deepEqual(wrong, []);
+    await page.close();
+  });
+
+  test("of many points some are drawn at once, and more when nothing moves", async (context) => {
+    const file = path.join(folder(context), "many.ply");
+    const side = 400;
+    const header = `ply\nformat binary_little_endian 1.0\nelement vertex ${side * side}\n`;
+    const properties = ["x", "y", "z"].map((axis) => `property float ${axis}\n`).join("");
+    const rows = Float32Array.from({ length: 3 * side * side }, (_, i) => {
+      const point = Math.floor(i / 3);
+      return [point % side, Math.floor(point / side), 0][i % 3];
+    });
+    writeFileSync(
+      file,
+      Buffer.concat([Buffer.from(`${header}${properties}end_header\n`), Buffer.from(rows.buffer)]),
+    );
+    const { page, wrong } = await open(browser);
+    await page.evaluate(() => {
+      window.drawn = [];
+      const element = document.querySelector("#drawn");
+      const note = () => window.drawn.push(parseInt(element.textContent.replaceAll(",", "")));
+      new MutationObserver(note).observe(element, { childList: true });
+    });
+    await page.setInputFiles("#file", file);
+    await finished(page, "mean_curvature");
+    await page.waitForFunction(() => window.drawn.at(-1) > 1.3 * window.drawn[0]);
+    assert.ok((await page.evaluate(() => window.drawn[0])) < side * side);
     assert.deepEqual(wrong, []);
     await page.close();
   });

@@ -4,6 +4,7 @@
 //! affair: moments today, a robust re-weighting or a pooled descriptor as well.
 
 use crate::cell_index::{CellIndex, Row};
+use crate::extremes::larger;
 use crate::lattice::RowKey;
 use crate::simd::InstructionSet;
 use crate::simd::select::{BLOCK, Ball, Block, Place, Rows, Window, gather};
@@ -145,8 +146,8 @@ impl DirectWalk<'_> {
         self.windows.clear();
         for near in &mut self.near {
             // Distance along y and z from the run's box to the row's cells.
-            let gap_y = (near.low[0] - high[1]).max(low[1] - near.high[0]).max(0.0);
-            let gap_z = (near.low[1] - high[2]).max(low[2] - near.high[1]).max(0.0);
+            let gap_y = larger(larger(near.low[0] - high[1], low[1] - near.high[0]), 0.0);
+            let gap_z = larger(larger(near.low[1] - high[2], low[2] - near.high[1]), 0.0);
             let square = reach * reach - gap_y * gap_y - gap_z * gap_z;
             if square < 0.0 {
                 continue;

@@ -38,6 +38,7 @@ mod curvature;
 mod depth_image;
 mod error;
 mod extract;
+mod extremes;
 mod field;
 mod finding;
 mod fit;

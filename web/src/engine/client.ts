@@ -9,6 +9,7 @@ interface Waiting {
   resolve(result: unknown): void;
   reject(error: Error): void;
   progress?: (share: number) => void;
+  kind: Request["kind"];
 }
 
 type Load = Extract<Request, { kind: "load" }>;
@@ -63,14 +64,19 @@ export class Engine {
     const id = ++this.number;
     if (request.kind === "load") this.loaded = request as Load;
     return new Promise((resolve, reject) => {
-      this.waiting.set(id, { resolve: resolve as (result: unknown) => void, reject, progress });
+      this.waiting.set(id, {
+        resolve: resolve as (result: unknown) => void,
+        reject,
+        progress,
+        kind: request.kind,
+      });
       this.worker.postMessage({ id, request }, transfer);
     });
   }
 
-  /** Whether the worker has something to do. */
+  /** Whether the worker does something that can be stopped: its own start takes as long again. */
   get busy(): boolean {
-    return this.waiting.size > 0;
+    return [...this.waiting.values()].some(({ kind }) => kind !== "start");
   }
 
   /** Stops whatever runs, and starts again with the same cloud. What was extracted there is gone. */

@@ -30,6 +30,25 @@ export interface Layer {
   transform: number[] | null;
 }
 
+/** A layer of one point at 0. */
+export function onePoint(): Layer {
+  return {
+    name: "",
+    count: 1,
+    positions: new Float32Array(3),
+    origin: [0, 0, 0],
+    normals: null,
+    colours: null,
+    colour: null,
+    columns: new Map(),
+    labels: null,
+    labelName: "",
+    viewpoint: null,
+    stage: null,
+    transform: null,
+  };
+}
+
 /** Low and high corner of a layer's offsets. */
 export function boundsOf(layer: Layer): { low: Vector; high: Vector } {
   const low: Vector = [Infinity, Infinity, Infinity];

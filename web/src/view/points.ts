@@ -27,6 +27,9 @@ const MOST_BLOCK_POINTS = 65_535;
 /** Most blocks along an axis. */
 const MOST_CELLS = 24;
 
+/** Diameter of a drawn point, in diagonals of the box over the root of the number of points. */
+const CLOSED_BY_BOX = 1.6;
+
 interface Block {
   points: Points;
   sphere: Sphere;
@@ -67,7 +70,9 @@ export class PointLayer {
     const positions = new Float32Array(3 * layer.count);
     for (let place = 0; place < order.length; place++) {
       const i = 3 * order[place];
-      positions.set(layer.positions.subarray(i, i + 3), 3 * place);
+      positions[3 * place] = layer.positions[i];
+      positions[3 * place + 1] = layer.positions[i + 1];
+      positions[3 * place + 2] = layer.positions[i + 2];
     }
     for (let b = 0; b + 1 < starts.length; b++) this.addBlock(positions, starts[b], starts[b + 1]);
     this.place(1);
@@ -155,6 +160,15 @@ export class PointLayer {
     for (const block of this.blocks) block.points.geometry.attributes.direction.needsUpdate = true;
   }
 
+  /** Diameter of points with which a surface looks closed, as far as the box tells: a spacing needs a search. */
+  get closedDiameter(): number {
+    const [, middle, largest] = this.box
+      .getSize(new Vector3())
+      .toArray()
+      .sort((a, b) => a - b);
+    return (CLOSED_BY_BOX * Math.hypot(middle, largest)) / Math.sqrt(Math.max(1, this.layer.count));
+  }
+
   /** How many points each block should have: by the area on the screen, at most all. Points per block, 0 if hidden. */
   wanted(camera: Camera, pixelsPerUnit: number): number[] {
     const projection = new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
@@ -170,13 +184,14 @@ export class PointLayer {
     });
   }
 
-  /** Draws a share of what the blocks want; returns how many points that are. */
-  draw(wanted: number[], share: number): number {
+  /** Draws what is between two shares of what the blocks want; returns how many points that are. */
+  draw(wanted: number[], from: number, to: number): number {
     let drawn = 0;
     this.blocks.forEach(({ points }, b) => {
-      const count = Math.ceil(wanted[b] * share);
+      const start = Math.ceil(wanted[b] * from);
+      const count = Math.ceil(wanted[b] * to) - start;
       points.visible = count > 0;
-      points.geometry.setDrawRange(0, count);
+      points.geometry.setDrawRange(start, count);
       drawn += count;
     });
     return drawn;
@@ -199,19 +214,17 @@ function blockOrder(layer: Layer, low: Vector, high: Vector): { order: Uint32Arr
   const cells = Math.min(MOST_CELLS, Math.max(1, Math.round(Math.sqrt(count / BLOCK_POINTS))));
   const size = largest / cells;
   const counts = extents.map((extent) => Math.max(1, Math.min(cells, Math.ceil(extent / size))));
-  const cellOf = (i: number): number => {
-    let cell = 0;
-    for (let axis = 0; axis < 3; axis++) {
-      const at = Math.min(counts[axis] - 1, Math.floor((positions[3 * i + axis] - low[axis]) / size));
-      cell = cell * counts[axis] + at;
-    }
-    return cell;
-  };
-  const starts = new Uint32Array(counts[0] * counts[1] * counts[2] + 1);
+  const [countX, countY, countZ] = counts;
+  const at = (offset: number, most: number): number => Math.min(most - 1, Math.floor(offset / size));
+  const starts = new Uint32Array(countX * countY * countZ + 1);
   const cellNumbers = new Uint16Array(count);
   for (let i = 0; i < count; i++) {
-    cellNumbers[i] = cellOf(i);
-    starts[cellNumbers[i] + 1]++;
+    const x = at(positions[3 * i] - low[0], countX);
+    const y = at(positions[3 * i + 1] - low[1], countY);
+    const z = at(positions[3 * i + 2] - low[2], countZ);
+    const cell = (x * countY + y) * countZ + z;
+    cellNumbers[i] = cell;
+    starts[cell + 1]++;
   }
   for (let cell = 1; cell < starts.length; cell++) starts[cell] += starts[cell - 1];
   const next = starts.slice();
@@ -228,6 +241,8 @@ function shuffle(numbers: Uint32Array): void {
   for (let i = numbers.length - 1; i > 0; i--) {
     state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
     const k = Math.floor((state / 2 ** 32) * (i + 1));
-    [numbers[i], numbers[k]] = [numbers[k], numbers[i]];
+    const number = numbers[i];
+    numbers[i] = numbers[k];
+    numbers[k] = number;
   }
 }

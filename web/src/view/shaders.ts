@@ -45,6 +45,17 @@ void main() {
 }
 `;
 
+/** Rings of eight places around a pixel that eye-dome lighting looks at: all, and where time is short. */
+export const [RINGS, FEW_RINGS] = [2, 1];
+
+/** Pixels between two rings. */
+const RING_STEP = 1.4;
+
+/** The sum over the places of a ring. Written out: software renderers are slow at indexed constants. */
+const RING_SUM = Array.from({ length: 8 }, (_, i) => (Math.PI / 4) * i)
+  .map((angle) => `shadow(own, turn * vec2(${Math.cos(angle).toFixed(6)}, ${Math.sin(angle).toFixed(6)}))`)
+  .join(" +\n      ");
+
 /** Eye-dome lighting (Boucheny 2009): a pixel is darker the more of its neighbours are nearer, on a log scale. */
 export const EYE_DOME_FRAGMENT = /* glsl */ `
 varying vec2 where;
@@ -54,35 +65,32 @@ uniform vec2 pixel;
 uniform float near;
 uniform float far;
 uniform float strength;
+uniform int rings;
 uniform vec3 background;
 
-const float NOTHING = 1e6;
+// The logarithm of 2 near far over the distance.
+float logNearness(float depth) {
+  return log2(far + near - (2.0 * depth - 1.0) * (far - near));
+}
 
-float logDepth(vec2 at) {
-  float depth = texture2D(depths, at).x;
-  if (depth >= 1.0) return NOTHING;
-  float z = 2.0 * depth - 1.0;
-  return log2(2.0 * near * far / (far + near - z * (far - near)));
+// Edges before the background are no darker than others: the sum of one pixel is limited.
+float shadow(float own, vec2 at) {
+  float depth = texture2D(depths, where + pixel * at).x;
+  return depth < 1.0 ? clamp(logNearness(depth) - own, 0.0, 0.06) : 0.0;
 }
 
 void main() {
-  float own = logDepth(where);
+  float depth = texture2D(depths, where).x;
+  float own = logNearness(depth);
   float sum = 0.0;
-  float weight = 0.0;
-  if (own == NOTHING) {
-    gl_FragColor = vec4(background, 1.0);
-    return;
+  // Software renderers compute all branches, and leave loops early: the background has none to go through.
+  int count = depth < 1.0 ? rings : 0;
+  for (int ring = 1; ring <= count; ring++) {
+    float angle = 0.39 * float(ring - 1);
+    mat2 turn = ${RING_STEP} * float(ring) * mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
+    sum += ${RING_SUM};
   }
-  for (int ring = 1; ring <= 2; ring++) {
-    for (int i = 0; i < 8; i++) {
-      float angle = 0.7853981634 * float(i) + 0.39 * float(ring - 1);
-      float depth = logDepth(where + 1.4 * float(ring) * pixel * vec2(cos(angle), sin(angle)));
-      weight += 1.0;
-      // Edges before the background are no darker than others: the sum of one pixel is limited.
-      if (depth < NOTHING) sum += min(max(0.0, own - depth), 0.06);
-    }
-  }
-  float shade = exp(-strength * sum / weight);
-  gl_FragColor = vec4(texture2D(colours, where).rgb * shade, 1.0);
+  float shade = exp(-strength * sum / (8.0 * float(max(rings, 1))));
+  gl_FragColor = vec4(depth < 1.0 ? texture2D(colours, where).rgb * shade : background, 1.0);
 }
 `;

@@ -1,43 +1,35 @@
 /** The view: a camera that turns about the points, eye-dome lighting, and as many points as are drawn smoothly. */
 
-import {
-  DepthTexture,
-  type Object3D,
-  OrthographicCamera,
-  PerspectiveCamera,
-  Mesh,
-  NearestFilter,
-  PlaneGeometry,
-  Scene,
-  ShaderMaterial,
-  Sphere,
-  Box3,
-  UnsignedIntType,
-  Vector2,
-  Vector3,
-  WebGLRenderer,
-  WebGLRenderTarget,
-  Color,
-} from "three";
+import { Box3, type Object3D, PerspectiveCamera, Scene, Sphere, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Vector } from "../files/cloud.js";
+import { MOST, Pace } from "./pace.js";
 import { inView, pick, type Picked, projector } from "./pick.js";
+import { onePoint } from "./layer.js";
 import { PointLayer } from "./points.js";
-import { EYE_DOME_FRAGMENT, SCREEN_VERTEX } from "./shaders.js";
+import { Screen } from "./screen.js";
 
-/** Most points that are drawn when the view stands still. */
-const MOST_STILL = 6_000_000;
-/** Points drawn while it moves, at first; then as many as take about a frame. */
-const MOVING_START = 1_000_000;
-const MOVING_LEAST = 60_000;
-/** Milliseconds of a frame above which fewer points are drawn while moving, and below which more. */
-const [SLOW_FRAME, FAST_FRAME] = [40, 18];
-/** Darkness of an edge, per power of two by which its other side is nearer. */
-const EYE_DOME = 18;
 /** Width of the view, in widths of what it shows. */
 const MARGIN = 1.06;
 /** Milliseconds without a motion after which all are drawn. */
 const REST = 180;
+/** Milliseconds after the page's start when the points' programs are compiled: when the page is there to be seen. */
+const PREPARATION = 100;
+/** Least share of the points by which the others are drawn larger. */
+const LEAST_SHARE = 0.05;
+
+/** A picture, which is drawn out of sight, some points at a time, and then shown. */
+interface Picture {
+  /** Of each layer, how many points each block should have. */
+  wanted: number[][];
+  /** How many that are together. */
+  total: number;
+  /** Share of these that is drawn in the end. */
+  share: number;
+  /** Share of these, and points, that have been drawn. */
+  drawn: number;
+  points: number;
+}
 
 /** What a link keeps of the view. */
 export interface ViewState {
@@ -51,70 +43,54 @@ export class Viewer {
   /** Where the view's 0 is, in the coordinates of the file. */
   origin: Vector = [0, 0, 0];
   onDrawn: (drawn: number, total: number) => void = () => undefined;
-  private readonly renderer: WebGLRenderer;
+  private readonly screen: Screen;
   private readonly controls: OrbitControls;
   private readonly scene = new Scene();
   private readonly overlays: Object3D[] = [];
-  private readonly target: WebGLRenderTarget;
-  private readonly screen = new Scene();
-  private readonly screenCamera = new OrthographicCamera(-1, 1, 1, -1, 0, 1);
-  private readonly eyeDome: ShaderMaterial;
+  private readonly pace: Pace;
   private sphere = new Sphere(new Vector3(), 1);
-  private budget = MOVING_START;
   private lastMotion = -Infinity;
-  private lastFrame = 0;
   private requested = false;
+  /** Whether what is shown is out of date. */
+  private stale = true;
+  private refinement: Picture | null = null;
+  /** Who waits until a picture has been drawn. */
+  private readonly afterwards: (() => void)[] = [];
+  /** Kept, as programs go with the last material that uses them. */
+  private readonly firstPoint = new PointLayer(onePoint(), [0, 0, 0]);
   private diameter = 1;
   private sizeFactor = 1;
 
-  constructor(private readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: false, preserveDrawingBuffer: true });
+  constructor(canvas: HTMLCanvasElement) {
+    this.screen = new Screen(canvas);
+    this.pace = new Pace(this.screen.context);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.zoomToCursor = true;
     this.controls.addEventListener("change", () => this.moved());
-    this.target = new WebGLRenderTarget(1, 1, { minFilter: NearestFilter, magFilter: NearestFilter });
-    this.target.depthTexture = new DepthTexture(1, 1, UnsignedIntType);
-    this.eyeDome = new ShaderMaterial({
-      vertexShader: SCREEN_VERTEX,
-      fragmentShader: EYE_DOME_FRAGMENT,
-      depthTest: false,
-      depthWrite: false,
-      uniforms: {
-        colours: { value: this.target.texture },
-        depths: { value: this.target.depthTexture },
-        pixel: { value: new Vector2() },
-        near: { value: 1 },
-        far: { value: 1 },
-        strength: { value: EYE_DOME },
-        background: { value: new Color() },
-      },
-    });
-    this.screen.add(new Mesh(new PlaneGeometry(2, 2), this.eyeDome));
     new ResizeObserver(() => this.resized()).observe(canvas);
     this.resized();
+    setTimeout(() => this.prepare(), PREPARATION);
   }
 
-  get size(): { width: number; height: number } {
-    return { width: this.canvas.clientWidth || 1, height: this.canvas.clientHeight || 1 };
+  /** Draws a point out of sight, so that the programs are there before a file is: that takes up to half a second. */
+  private prepare(): void {
+    if (this.layers.length > 0) return;
+    this.scene.add(this.firstPoint.group);
+    this.screen.draw(this.scene, this.camera);
+    this.scene.remove(this.firstPoint.group);
   }
 
   private resized(): void {
-    const { width, height } = this.size;
-    const ratio = Math.min(window.devicePixelRatio, 2);
-    this.renderer.setPixelRatio(ratio);
-    this.renderer.setSize(width, height, false);
-    this.target.setSize(width * ratio, height * ratio);
-    this.eyeDome.uniforms.pixel.value.set(1 / width, 1 / height);
+    this.screen.resize();
+    const { width, height } = this.screen.size;
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     this.render();
   }
 
   setBackground(css: string): void {
-    // Colours are drawn as they are, without conversion.
-    const [r, g, b] = (css.match(/\d+(\.\d+)?/g) ?? ["255", "255", "255"]).map(Number);
-    this.eyeDome.uniforms.background.value.setRGB(r / 255, g / 255, b / 255);
+    this.screen.setBackground(css);
     this.render();
   }
 
@@ -152,7 +128,7 @@ export class Viewer {
   }
 
   setShading(eyeDome: boolean, normals: boolean): void {
-    this.eyeDome.uniforms.strength.value = eyeDome ? EYE_DOME : 0;
+    this.screen.setEyeDome(eyeDome);
     for (const { material } of this.layers) material.uniforms.shading.value = normals ? 1 : 0;
     this.render();
   }
@@ -222,18 +198,18 @@ export class Viewer {
   }
 
   pick(x: number, y: number): Picked | null {
-    const { width, height } = this.size;
+    const { width, height } = this.screen.size;
     return pick(this.visible, this.camera, width, height, x, y);
   }
 
   inView(layer: PointLayer): Uint32Array<ArrayBuffer> {
-    const { width, height } = this.size;
+    const { width, height } = this.screen.size;
     return inView(layer, this.camera, width, height);
   }
 
   /** Where a point is on the screen, in pixels; null behind the viewer. */
   onScreen(layer: PointLayer, point: number): [number, number] | null {
-    const { width, height } = this.size;
+    const { width, height } = this.screen.size;
     const seen = projector(layer, this.camera, width, height)(point, new Vector3());
     return seen.z > 0 ? [seen.x, seen.y] : null;
   }
@@ -249,49 +225,122 @@ export class Viewer {
 
   /** Draws soon. */
   render(): void {
-    if (this.requested) return;
+    this.stale = true;
+    this.schedule();
+  }
+
+  private schedule(): void {
+    if (this.requested || this.pace.busy) return;
     this.requested = true;
     requestAnimationFrame((now) => {
       this.requested = false;
-      this.draw(now);
+      if (this.stale) this.drawQuickly(now);
+      else if (this.refinement !== null) this.refine(this.refinement);
     });
   }
 
-  private draw(now: number): void {
-    const moving = now - this.lastMotion < REST;
-    if (moving) {
-      const took = now - this.lastFrame;
-      if (took < 1000 && took > SLOW_FRAME) this.budget = Math.max(MOVING_LEAST, 0.8 * this.budget);
-      else if (took < FAST_FRAME) this.budget = Math.min(MOST_STILL, 1.15 * this.budget);
-    }
-    this.lastFrame = now;
-    const { height } = this.size;
-    const ratio = this.renderer.getPixelRatio();
-    const pixelsPerUnit = (height * ratio) / (2 * Math.tan((this.camera.fov * Math.PI) / 360));
-    this.setDepthRange();
-    const layers = this.visible;
-    const wanted = layers.map((layer) => layer.wanted(this.camera, pixelsPerUnit));
-    const all = wanted.flat().reduce((sum, count) => sum + count, 0);
-    const share = Math.min(1, (moving ? this.budget : MOST_STILL) / Math.max(all, 1));
-    let drawn = 0;
-    layers.forEach((layer, i) => {
-      const { uniforms } = layer.material;
-      uniforms.pixelsPerUnit.value = pixelsPerUnit;
-      // Fewer points are drawn larger, so that surfaces stay closed.
-      uniforms.diameter.value = (this.diameter * this.sizeFactor) / Math.sqrt(Math.max(share, 0.05));
-      uniforms.leastSize.value = Math.max(1, 1.4 * ratio * Math.min(this.sizeFactor, 3));
-      drawn += layer.draw(wanted[i], share);
+  /** Waits until a picture has been drawn, or for some time: a page out of sight draws none. */
+  drawn(patience: number): Promise<void> {
+    return new Promise((resolve) => {
+      this.afterwards.push(resolve);
+      setTimeout(resolve, patience);
     });
-    this.renderer.setRenderTarget(this.target);
-    this.renderer.clear();
-    this.renderer.render(this.scene, this.camera);
-    this.renderer.setRenderTarget(null);
-    this.renderer.render(this.screen, this.screenCamera);
-    this.onDrawn(
-      drawn,
-      layers.reduce((sum, { layer }) => sum + layer.count, 0),
+  }
+
+  private next(points: number, begun: number): void {
+    this.pace.follow(points, begun, () => {
+      for (const resolve of this.afterwards.splice(0)) resolve();
+      if (this.stale || this.refinement !== null) this.schedule();
+    });
+  }
+
+  /** Shows as many points as are drawn at once; where that are not all, all are drawn when nothing moves. */
+  private drawQuickly(now: number): void {
+    this.stale = false;
+    const begun = performance.now();
+    const whole = this.newPicture();
+    const share = Math.min(whole.share, this.pace.budget / whole.total);
+    this.begin(share);
+    const drawn = this.drawPart({ ...whole }, share);
+    const isWhole = share === whole.share;
+    this.show(drawn, isWhole);
+    const moving = now - this.lastMotion < REST;
+    this.refinement = isWhole || moving ? null : whole;
+    if (!isWhole && moving) {
+      setTimeout(() => {
+        const still = performance.now() - this.lastMotion >= REST;
+        if (still && !this.stale && this.refinement === null) {
+          this.refinement = this.newPicture();
+          this.schedule();
+        }
+      }, REST + 10);
+    }
+    this.next(drawn, begun);
+  }
+
+  /** Draws some points more of the picture that comes next, and shows it when it is whole. */
+  private refine(picture: Picture): void {
+    const begun = performance.now();
+    if (picture.drawn === 0) this.begin(picture.share);
+    const until = Math.min(picture.share, picture.drawn + this.pace.budget / picture.total);
+    const points = this.drawPart(picture, until);
+    if (until === picture.share) {
+      this.show(picture.points, true);
+      this.refinement = null;
+    }
+    this.next(points, begun);
+  }
+
+  private newPicture(): Picture {
+    this.setDepthRange();
+    this.camera.updateMatrixWorld();
+    const wanted = this.visible.map((layer) => layer.wanted(this.camera, this.pixelsPerUnit));
+    const total = Math.max(
+      1,
+      wanted.flat().reduce((sum, count) => sum + count, 0),
     );
-    if (moving) setTimeout(() => this.render(), REST + 10);
+    return { wanted, total, share: Math.min(1, MOST / total), drawn: 0, points: 0 };
+  }
+
+  private get pixelsPerUnit(): number {
+    const height = this.screen.size.height * this.screen.pixelRatio;
+    return height / (2 * Math.tan((this.camera.fov * Math.PI) / 360));
+  }
+
+  /** Begins a picture that has a share of the points. */
+  private begin(share: number): void {
+    for (const { material } of this.visible) {
+      material.uniforms.pixelsPerUnit.value = this.pixelsPerUnit;
+      // Fewer points are drawn larger, so that surfaces stay closed.
+      material.uniforms.diameter.value =
+        (this.diameter * this.sizeFactor) / Math.sqrt(Math.max(share, LEAST_SHARE));
+      material.uniforms.leastSize.value = Math.max(
+        1,
+        1.4 * this.screen.pixelRatio * Math.min(this.sizeFactor, 3),
+      );
+    }
+    this.screen.begin();
+  }
+
+  /** Draws the next points into the picture that was begun, until it has a share of them; returns how many. */
+  private drawPart(picture: Picture, until: number): number {
+    let points = 0;
+    this.visible.forEach((layer, i) => {
+      points += layer.draw(picture.wanted[i], picture.drawn, until);
+    });
+    picture.drawn = until;
+    picture.points += points;
+    this.screen.draw(this.scene, this.camera);
+    return points;
+  }
+
+  /** Shows the picture that was drawn. */
+  private show(points: number, isWhole: boolean): void {
+    this.screen.show(this.camera, isWhole);
+    this.onDrawn(
+      points,
+      this.visible.reduce((sum, { layer }) => sum + layer.count, 0),
+    );
   }
 
   /** Near and far planes that hold everything, close together. */
@@ -306,18 +355,15 @@ export class Viewer {
     this.camera.near = near;
     this.camera.far = far;
     this.camera.updateProjectionMatrix();
-    this.eyeDome.uniforms.near.value = near;
-    this.eyeDome.uniforms.far.value = far;
   }
 
   /** The picture as a PNG file. */
   picture(): Promise<Blob> {
-    this.draw(performance.now() + REST);
-    return new Promise((resolve, reject) => {
-      this.canvas.toBlob(
-        (blob) => (blob === null ? reject(new Error("no picture")) : resolve(blob)),
-        "image/png",
-      );
-    });
+    const whole = this.newPicture();
+    // What was begun out of sight is gone.
+    this.refinement = null;
+    this.begin(whole.share);
+    this.show(this.drawPart(whole, whole.share), true);
+    return this.screen.picture();
   }
 }

@@ -6,6 +6,7 @@ use super::robust::{self, Distances, without_outliers};
 use super::{ExtractOptions, Neighborhood};
 use crate::ball::DirectWalk;
 use crate::cell_index::{CellIndex, Row};
+use crate::extremes::{larger, smaller};
 use crate::fit::FitKind;
 use crate::fit::paraboloid::{Paraboloids, Task, fit_paraboloids};
 use crate::fit::quadric::fit_quadrics;
@@ -135,8 +136,8 @@ impl<'a> Worker<'a> {
         let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for rank in run.clone() {
             for (axis, value) in [x[rank], y[rank], z[rank]].into_iter().enumerate() {
-                low[axis] = low[axis].min(value);
-                high[axis] = high[axis].max(value);
+                low[axis] = smaller(low[axis], value);
+                high[axis] = larger(high[axis], value);
             }
         }
         self.walk.enter_run(low, high);

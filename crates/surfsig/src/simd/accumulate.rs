@@ -57,59 +57,55 @@ fn accumulate_in<S: Scalar, const BYTES: usize>(block: &Block, len: usize, lanes
 #[inline(always)]
 fn accumulate_lanes<S: Scalar, const WIDTH: usize>(block: &Block, len: usize, lanes: &mut LaneSums<S>) {
     assert!(len <= BLOCK);
-    pass::<S, WIDTH, 9>(block, len, lanes, &PLANE, |x, y, _| {
+    pass::<S, WIDTH, 9>(block, len, lanes, &PLANE, |x, y, _, sums| {
+        let [sx, sy, sxx, sxy, syy, sxxx, sxxy, sxyy, sxxyy] = sums;
         let (xx, xy, yy) = (mul(x, x), mul(x, y), mul(y, y));
-        [
-            (x, None),
-            (y, None),
-            (x, Some(x)),
-            (x, Some(y)),
-            (y, Some(y)),
-            (xx, Some(x)),
-            (xx, Some(y)),
-            (x, Some(yy)),
-            (xy, Some(xy)),
-        ]
+        add(sx, x);
+        add(sy, y);
+        add_product(sxx, x, x);
+        add_product(sxy, x, y);
+        add_product(syy, y, y);
+        add_product(sxxx, xx, x);
+        add_product(sxxy, xx, y);
+        add_product(sxyy, x, yy);
+        add_product(sxxyy, xy, xy);
     });
-    pass::<S, WIDTH, 9>(block, len, lanes, &HEIGHT, |x, y, z| {
+    pass::<S, WIDTH, 9>(block, len, lanes, &HEIGHT, |x, y, z, sums| {
+        let [syyy, sxxxx, sxxxy, sxyyy, syyyy, sz, sxxz, sxyz, syyz] = sums;
         let (xx, xy, yy) = (mul(x, x), mul(x, y), mul(y, y));
-        [
-            (yy, Some(y)),
-            (xx, Some(xx)),
-            (xx, Some(xy)),
-            (xy, Some(yy)),
-            (yy, Some(yy)),
-            (z, None),
-            (xx, Some(z)),
-            (xy, Some(z)),
-            (yy, Some(z)),
-        ]
+        add_product(syyy, yy, y);
+        add_product(sxxxx, xx, xx);
+        add_product(sxxxy, xx, xy);
+        add_product(sxyyy, xy, yy);
+        add_product(syyyy, yy, yy);
+        add(sz, z);
+        add_product(sxxz, xx, z);
+        add_product(sxyz, xy, z);
+        add_product(syyz, yy, z);
     });
-    pass::<S, WIDTH, 8>(block, len, lanes, &HEIGHT_CUBIC, |x, y, z| {
+    pass::<S, WIDTH, 8>(block, len, lanes, &HEIGHT_CUBIC, |x, y, z, sums| {
+        let [sxz, syz, sxxxz, sxxyz, sxyyz, syyyz, szz, sxxzz] = sums;
         let (xx, yy, xz, yz) = (mul(x, x), mul(y, y), mul(x, z), mul(y, z));
-        [
-            (x, Some(z)),
-            (y, Some(z)),
-            (xx, Some(xz)),
-            (xx, Some(yz)),
-            (yy, Some(xz)),
-            (yy, Some(yz)),
-            (z, Some(z)),
-            (xz, Some(xz)),
-        ]
+        add_product(sxz, x, z);
+        add_product(syz, y, z);
+        add_product(sxxxz, xx, xz);
+        add_product(sxxyz, xx, yz);
+        add_product(sxyyz, yy, xz);
+        add_product(syyyz, yy, yz);
+        add_product(szz, z, z);
+        add_product(sxxzz, xz, xz);
     });
-    pass::<S, WIDTH, 8>(block, len, lanes, &HEIGHT_SQUARE, |x, y, z| {
+    pass::<S, WIDTH, 8>(block, len, lanes, &HEIGHT_SQUARE, |x, y, z, sums| {
+        let [sxzz, syzz, sxyzz, syyzz, szzz, sxzzz, syzzz, szzzz] = sums;
         let (zz, xz, yz) = (mul(z, z), mul(x, z), mul(y, z));
-        [
-            (zz, Some(x)),
-            (zz, Some(y)),
-            (xz, Some(yz)),
-            (yz, Some(yz)),
-            (zz, Some(z)),
-            (xz, Some(zz)),
-            (yz, Some(zz)),
-            (zz, Some(zz)),
-        ]
+        add_product(sxzz, zz, x);
+        add_product(syzz, zz, y);
+        add_product(sxyzz, xz, yz);
+        add_product(syyzz, yz, yz);
+        add_product(szzz, zz, z);
+        add_product(sxzzz, xz, zz);
+        add_product(syzzz, yz, zz);
+        add_product(szzzz, zz, zz);
     });
 }
 
@@ -157,7 +153,8 @@ const HEIGHT_SQUARE: [usize; 8] = [
     slot(0, 0, 4),
 ];
 
-/// One pass over the block: `terms` gives, for `WIDTH` points, the products to add.
+/// One pass over the block: `terms` adds the products of `WIDTH` points to their sums. It names each of these: a loop
+/// over them is not unrolled in WebAssembly, and took four times as long.
 ///
 /// `WIDTH` hardware lanes take their share of the virtual ones in turn, which keeps the sums in
 /// registers.
@@ -167,23 +164,14 @@ fn pass<S: Scalar, const WIDTH: usize, const TERMS: usize>(
     len: usize,
     lanes: &mut LaneSums<S>,
     slots: &[usize; TERMS],
-    terms: impl Fn([S; WIDTH], [S; WIDTH], [S; WIDTH]) -> [([S; WIDTH], Option<[S; WIDTH]>); TERMS],
+    terms: impl Fn([S; WIDTH], [S; WIDTH], [S; WIDTH], &mut [[S; WIDTH]; TERMS]),
 ) {
     for part in 0..VIRTUAL_LANES / WIDTH {
         let first = part * WIDTH;
         let mut totals = [[S::default(); WIDTH]; TERMS];
         for step in 0..len.div_ceil(VIRTUAL_LANES) {
             let at = step * VIRTUAL_LANES + first;
-            let (x, y, z) = (load(&block.x, at), load(&block.y, at), load(&block.z, at));
-            let products = terms(x, y, z);
-            for (total, (a, b)) in totals.iter_mut().zip(products) {
-                for l in 0..WIDTH {
-                    total[l] = match b {
-                        Some(b) => a[l].mul_add(b[l], total[l]),
-                        None => a[l] + total[l],
-                    };
-                }
-            }
+            terms(load(&block.x, at), load(&block.y, at), load(&block.z, at), &mut totals);
         }
         for (total, &slot) in totals.iter().zip(slots) {
             for (l, piece) in
@@ -212,6 +200,20 @@ fn mul<S: Scalar, const WIDTH: usize>(a: [S; WIDTH], b: [S; WIDTH]) -> [S; WIDTH
         product[l] = a[l] * b[l];
     }
     product
+}
+
+#[inline(always)]
+fn add<S: Scalar, const WIDTH: usize>(sum: &mut [S; WIDTH], term: [S; WIDTH]) {
+    for l in 0..WIDTH {
+        sum[l] = term[l] + sum[l];
+    }
+}
+
+#[inline(always)]
+fn add_product<S: Scalar, const WIDTH: usize>(sum: &mut [S; WIDTH], a: [S; WIDTH], b: [S; WIDTH]) {
+    for l in 0..WIDTH {
+        sum[l] = a[l].mul_add(b[l], sum[l]);
+    }
 }
 
 /// Sums each row's lanes in a fixed order, the same tree on every instruction set.

@@ -5,6 +5,8 @@
 //! does not depend on its neighbours in the batch.
 
 use crate::multiply_add::MultiplyAdd;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+use std::arch::wasm32::v128;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 /// `[f(0), f(1), ...]` by a plain loop: a closure handed to a library function would be compiled on
@@ -44,6 +46,9 @@ impl Lanes {
     /// `self * factor + term`, rounded once where the hardware can.
     #[inline(always)]
     pub fn mul_add(self, factor: Self, term: Self) -> Self {
+        if cfg!(target_family = "wasm") {
+            return self * factor + term;
+        }
         Self(each_lane!(l => self.0[l].times_plus(factor.0[l], term.0[l])))
     }
 
@@ -80,6 +85,27 @@ impl Lanes {
     }
 }
 
+/// WebAssembly's vectors of two: of the plain loops the compiler leaves some as they are.
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+impl Lanes {
+    #[inline(always)]
+    fn with(self, other: Self, operation: impl Fn(v128, v128) -> v128) -> Self {
+        let (mine, others) = (self.vectors(), other.vectors());
+        let mut vectors = mine;
+        for i in 0..vectors.len() {
+            vectors[i] = operation(mine[i], others[i]);
+        }
+        // SAFETY: four vectors are eight numbers, of which every bit pattern is one.
+        Self(unsafe { std::mem::transmute::<[v128; LANES / 2], [f64; LANES]>(vectors) })
+    }
+
+    #[inline(always)]
+    fn vectors(self) -> [v128; LANES / 2] {
+        // SAFETY: as above.
+        unsafe { std::mem::transmute::<[f64; LANES], [v128; LANES / 2]>(self.0) }
+    }
+}
+
 impl Mask {
     pub const ALL: Self = Self([u64::MAX; LANES]);
 
@@ -103,20 +129,23 @@ impl Mask {
 }
 
 macro_rules! lanewise {
-    ($trait:ident, $method:ident, $op:tt) => {
+    ($trait:ident, $method:ident, $op:tt, $vector:ident) => {
         impl $trait for Lanes {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
+                #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+                return self.with(other, |a, b| std::arch::wasm32::$vector(a, b));
+                #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
                 Self(each_lane!(l => self.0[l] $op other.0[l]))
             }
         }
     };
 }
-lanewise!(Add, add, +);
-lanewise!(Sub, sub, -);
-lanewise!(Mul, mul, *);
-lanewise!(Div, div, /);
+lanewise!(Add, add, +, f64x2_add);
+lanewise!(Sub, sub, -, f64x2_sub);
+lanewise!(Mul, mul, *, f64x2_mul);
+lanewise!(Div, div, /, f64x2_div);
 
 impl Neg for Lanes {
     type Output = Self;

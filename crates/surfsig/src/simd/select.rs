@@ -6,6 +6,7 @@
 
 use super::InstructionSet;
 use super::instruction_set::Kind;
+use crate::extremes::larger;
 use crate::lattice::Lattice;
 use crate::multiply_add::MultiplyAdd;
 
@@ -166,8 +167,8 @@ fn gather_by(
         for axis in 0..3 {
             shift[axis] = (window.between[axis] - ball.query[axis]) as f32;
         }
-        let gap_y = (shift[1].abs() - ball.half_step).max(0.0);
-        let gap_z = (shift[2].abs() - ball.half_step).max(0.0);
+        let gap_y = larger(shift[1].abs() - ball.half_step, 0.0);
+        let gap_z = larger(shift[2].abs() - ball.half_step, 0.0);
         if gap_y * gap_y + gap_z * gap_z <= BALL_LIMIT {
             let placement = Placement { scale: ball.scale, shift };
             let mut start = window.ranks.start.max(place.rank);
