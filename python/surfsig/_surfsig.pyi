@@ -362,7 +362,6 @@ class RecurrenceSettings:
         object_points: int | None = None,
         symmetry_excess: float | None = None,
         rival_distance: float | None = None,
-        rival_push: float | None = None,
         rival_deficit: float | None = None,
         rival_deviations: float | None = None,
         least_explained: float | None = None,
@@ -480,9 +479,6 @@ class RecurrenceSettings:
     @property
     def rival_distance(self) -> float:
         """Radii of a patch by which a rival moves points elsewhere, at least."""
-    @property
-    def rival_push(self) -> float:
-        """Radii of a patch by which a piece is pushed along motions that are weakly held."""
     @property
     def rival_deficit(self) -> float:
         """What a rival explains less of what is seen with both poses, as a share, at least, to be refuted."""

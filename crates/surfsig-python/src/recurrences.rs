@@ -84,8 +84,6 @@ settings_class! {
         symmetry_excess: f64 = symmetry_excess,
         /// Radii of a patch by which a rival moves points elsewhere, at least.
         rival_distance: f64 = rivals.distance,
-        /// Radii of a patch by which a piece is pushed along motions that are weakly held.
-        rival_push: f64 = rivals.push,
         /// What a rival explains less of what is seen with both poses, as a share, at least, to be refuted.
         rival_deficit: f64 = rivals.deficit,
         /// The same in its standard errors.

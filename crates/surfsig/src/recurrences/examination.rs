@@ -201,7 +201,7 @@ impl PiecePair<'_> {
         // Pieces too small for that.
         let rows = self.residuals(T_target_source, settings.surface_points).into_iter();
         let (points, normals): (Vec<[f64; 3]>, Vec<[f64; 3]>) =
-            rows.map(|(point, normal, _)| (point.into(), normal.into())).unzip();
+            rows.map(|(point, normal, _)| (<[f64; 3]>::from(point), <[f64; 3]>::from(normal))).unzip();
         free_directions(&points, &normals)
     }
 
