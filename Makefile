@@ -48,12 +48,18 @@ endif
 page: web/node_modules/.built ## Build the page: the core in WebAssembly, and the viewer of all reports
 	cd web && node build_engine.mjs && node build.mjs
 
+# The browser that tests and benchmarks of the page drive.
+CHROMIUM ?= $(firstword $(wildcard /usr/bin/chromium /usr/bin/chromium-browser /usr/bin/google-chrome))
+export CHROMIUM
+
 test-web: build ## Test the page in Chromium; skipped, with the reason, where Chromium or node is missing
-ifdef NODE
+ifndef NODE
+	@echo "skipped: node is missing (https://nodejs.org), which drives the browser"
+else ifeq ($(CHROMIUM),)
+	@echo "skipped: Chromium is not installed (Debian: apt install chromium), nor named by CHROMIUM="
+else
 	$(MAKE) web/node_modules/.built
 	cd web && PYTHON=$(CURDIR)/$(BIN)/python node --test tests/*.test.mjs
-else
-	@echo "skipped: node is missing (https://nodejs.org), which drives the browser"
 endif
 
 bench-page: build web/node_modules/.built ## Time the page in Chromium beside one native thread, and write that part of BENCHMARKS.md

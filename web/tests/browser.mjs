@@ -18,21 +18,20 @@ export const PICTURES = process.env.SURFSIG_PICTURES ?? null;
 
 const PYTHON = process.env.PYTHON ?? path.join(root, ".venv", "bin", "python");
 
-const BROWSERS = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
-
 /** Milliseconds that any computation may take on a slow machine. */
 const PATIENCE = 120_000;
 
 /** Why there are no tests here; null where there are. */
 export function missing() {
-  if (browserPath() === undefined) return "Chromium is not installed (Debian: apt install chromium)";
+  if (browserPath() === undefined) return "CHROMIUM names no browser (`make test-web` looks for one)";
   if (!existsSync(PAGE)) return "the page has not been built (make page)";
   if (!existsSync(PYTHON)) return `there is no ${PYTHON}, whose values are compared`;
   return null;
 }
 
 function browserPath() {
-  return [process.env.CHROMIUM, ...BROWSERS].find((file) => file !== undefined && existsSync(file));
+  const file = process.env.CHROMIUM;
+  return file !== undefined && existsSync(file) ? file : undefined;
 }
 
 export function launch() {
