@@ -95,6 +95,9 @@ impl Tracker {
         scan: &ThinnedScan,
         doubted: Option<&ScanAlignment>,
     ) -> Option<(ScanAlignment, LocalMap)> {
+        if !self.searches_keyframes {
+            return None;
+        }
         let (expectation, median_range) = (&self.expectation, self.median_range);
         let is_met = |found: &ScanAlignment| {
             found.free_directions.is_empty()
