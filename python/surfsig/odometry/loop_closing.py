@@ -68,7 +68,7 @@ def closed(
         if own and len(nodes) > 1:
             chain = _Chain(poses[nodes], own, number, reach)
             poses[nodes] = chain.closed()
-            covariances[nodes] = chain.factors(poses[nodes]) * covariances[nodes]
+            covariances[nodes] = chain.factors(poses[nodes], covariances[nodes]) * covariances[nodes]
     return poses, covariances
 
 
@@ -109,29 +109,51 @@ class _Chain:
         """Give the poses that agree best with steps and loops."""
         return self._graph.fit(self._poses)
 
-    def factors(self, poses: Array) -> Array:
-        """Give what the loops that came later make of covariances, (n, 6, 6): factors of their entries.
+    def factors(self, poses: Array, given: Array) -> Array:
+        """Give what the loops make of given covariances, (n, 6, 6): factors of their entries.
 
-        Each scan's covariance is that of the steps and loops before it. Those after it take the same share of
-        it as they do of a random walk's covariance, of rotations and translations.
+        Each scan's covariance is that of the steps before it, and of those loops that it knows of. The others
+        take the same share of it as they do of a random walk's covariance, of rotations and translations.
         """
         some = np.unique(np.linspace(0, len(poses) - 1, min(len(poses), _COVARIANCES)).astype(np.int64))
         deviations = []
-        for covariances in (self._graph.covariances(poses, some), self._when_it_came()[some]):
-            diagonal = np.einsum("nii->ni", covariances)
-            deviations.append(np.sqrt(np.column_stack([diagonal[:, :3].sum(1), diagonal[:, 3:].sum(1)])))
+        for covariances in (self._graph.covariances(poses, some), self._when_it_came(given)[some]):
+            deviations.append(np.sqrt(_variances(covariances)))
         after, before = deviations
         share = np.divide(after, before, out=np.ones_like(after), where=before > 0.0).clip(0.0, 1.0)
         every = np.arange(len(poses))
         root = np.column_stack([np.interp(every, some, share[:, part]) for part in (0, 0, 0, 1, 1, 1)])
         return np.asarray(root[:, :, None] * root[:, None, :])
 
-    def _when_it_came(self) -> Array:
-        """Give the covariances of a random walk with the loops up to each scan, (n, 6, 6)."""
+    def _when_it_came(self, given: Array) -> Array:
+        """Give the covariances of a random walk with the loops that given ones know of, (n, 6, 6).
+
+        They know of those within one map. After a loop with an earlier map they are those of the way around.
+        """
         result = np.zeros((len(self._poses), 6, 6))
         for scan in range(1, len(result)):
-            earlier = self._loops.get(scan, scan - 1)
-            change = self._of_loop if scan in self._loops else self._of_steps[scan - 1]
-            to_scan = geometry.adjoint(geometry.inverse(self._poses[scan]) @ self._poses[earlier])
-            result[scan] = to_scan @ result[earlier] @ to_scan.T + np.diag(change)
+            result[scan] = self._carried(result, scan - 1, scan, self._of_steps[scan - 1])
+            if scan in self._loops:
+                by_loop = self._carried(result, self._loops[scan], scan, self._of_loop)
+                if _has_fallen(given[scan - 1 : scan + 1], np.array([result[scan], by_loop])):
+                    result[scan] = by_loop
         return result
+
+    def _carried(self, covariances: Array, start: int, end: int, change: Array) -> Array:
+        """Give the covariance of a scan by that of another one and of the pose between, (6, 6)."""
+        to_end = geometry.adjoint(geometry.inverse(self._poses[end]) @ self._poses[start])
+        return np.asarray(to_end @ covariances[start] @ to_end.T + np.diag(change))
+
+
+def _variances(covariances: Array) -> Array:
+    """Give those of rotation and of translation, (n, 2)."""
+    diagonal = np.einsum("nii->ni", covariances)
+    return np.column_stack([diagonal[:, :3].sum(1), diagonal[:, 3:].sum(1)])
+
+
+def _has_fallen(given: Array, expected: Array) -> bool:
+    """Whether the second of two covariances is below the first by most of what is expected, (2, 6, 6)."""
+    pairs = np.array([_variances(given), _variances(expected)])
+    known = np.isfinite(pairs).all(axis=(0, 1)) & (pairs > 0.0).all(axis=(0, 1))
+    ratios = np.log(pairs[:, 1] / np.where(known, pairs[:, 0], 1.0), where=known, out=np.zeros((2, 2)))
+    return bool((ratios[0] < 0.5 * ratios[1]).any())

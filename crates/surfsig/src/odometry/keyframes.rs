@@ -77,7 +77,7 @@ impl Keyframes {
             points: in_float32(&scan.points),
             detail: in_float32(&scan.means(settings.detail_voxel)),
             range_image: scan.range_image.clone(),
-            ranges: Ranges::new(scan),
+            ranges: Ranges::new(scan.coarse.points()),
             described: None,
             is_loaded: true,
         });

@@ -48,7 +48,7 @@ impl Keyframes {
     fn chosen(&mut self, scan: &ThinnedScan, last: &RigidTransform) -> Vec<usize> {
         let most = self.settings.relocalisation.max_keyframes.min(self.kept.len());
         let distance = |number: &usize| (self.kept[*number].T_map_scan.translation - last.translation).norm();
-        let ranges = Ranges::new(scan);
+        let ranges = Ranges::new(scan.coarse.points());
         let difference = |number: &usize| self.kept[*number].ranges.difference(&ranges);
         let mut nearest: Vec<usize> = (0..self.kept.len()).collect();
         nearest.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
@@ -65,7 +65,7 @@ impl Keyframes {
         let mut chosen = Vec::new();
         let mut alike = alike.into_iter();
         for number in nearest {
-            chosen.extend([Some(number), alike.next()].into_iter().flatten());
+            chosen.extend([alike.next(), Some(number)].into_iter().flatten());
         }
         chosen
     }

@@ -109,7 +109,7 @@ impl Default for RelocalisationSettings {
             keyframe_distance: 0.3,
             keyframe_rotation: 30.0_f64.to_radians(),
             max_keyframes: 16,
-            max_described: 2,
+            max_described: 4,
             max_descriptions: 100,
             keypoints: 400,
             candidates_per_radius: 4.0,
