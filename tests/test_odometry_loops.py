@@ -94,6 +94,20 @@ def test_covariances_after_a_loop_with_an_earlier_map_were_those_of_the_way_arou
     assert 0.1 < np.mean(after) < 10.0
 
 
+def test_what_a_way_around_left_open_is_known_after_a_loop_with_an_earlier_map() -> None:
+    true = ring(80, 12.0)
+    walk = np.arange(80.0)[:, None, None] * np.diag([1e-8] * 3 + [1e-6] * 3)
+    walk[30:, 3, 3] = np.inf
+    slides = np.isin(np.arange(80), [30, 31, 78])
+    loop = LoopClosure(75, 0, geometry.inverse(true[0]) @ true[75], true[75])
+    _, covariances = closed(true, walk, np.zeros(80, np.int64), [loop], 8.0, slides)
+    is_known = np.isfinite(covariances).all(axis=(1, 2))
+    # From 78 on another motion is open.
+    np.testing.assert_array_equal(np.flatnonzero(~is_known), [*range(30, 75), 78, 79])
+    # As well as that of a few steps.
+    assert 0.0 < covariances[76, 3:, 3:].trace() < 30.0 * walk[1, 3:, 3:].trace()
+
+
 def test_segments_without_a_loop_and_scans_without_a_pose_stay() -> None:
     true = ring(40, 5.0)
     given = drifted(true, np.array([0.0, 0.0, 2e-3, 0.0, 0.0, 0.0]))
