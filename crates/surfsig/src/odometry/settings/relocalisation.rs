@@ -45,12 +45,13 @@ pub struct RelocalisationSettings {
     /// Of these, keyframes whose keypoints are described for one scan, at most: that takes longer than all else, and is
     /// done once for each. The next scan that is searched goes on.
     pub max_described: usize,
-    /// Keyframes of a map whose descriptions are kept, at most: each takes some 0.7 MB.
+    /// Keyframes of a map whose descriptions are kept, at most: each takes some 1.3 MB.
     pub max_descriptions: usize,
-    /// Keypoints of a scan and of a keyframe, at most. With 400 `benchmarks/odometry.py` found as many places as with
-    /// 1,000, and to describe and to match them took a fourth of the time.
+    /// Keypoints of a scan and of a keyframe, at most. Of eight places that `carry_away` of `benchmarks/odometry.py` takes
+    /// a lidar to (seeds 601 and 602), all were found with 800, and seven with 400.
     pub keypoints: usize,
-    /// Voxels along the radius of a keypoint's patch, of which each gives one candidate; likewise, 4 in place of 8.
+    /// Voxels along the radius of a keypoint's patch, of which each gives one candidate. With 4 as many of these places
+    /// were found as with 8, and to describe a scan took half of the time.
     pub candidates_per_radius: f64,
     /// Keyframes that are kept, at most: each takes some 300 kB.
     pub max_kept: usize,
@@ -110,8 +111,8 @@ impl Default for RelocalisationSettings {
             keyframe_rotation: 30.0_f64.to_radians(),
             max_keyframes: 16,
             max_described: 4,
-            max_descriptions: 100,
-            keypoints: 400,
+            max_descriptions: 64,
+            keypoints: 800,
             candidates_per_radius: 4.0,
             max_kept: 400,
             scans_apart: 30,
