@@ -303,7 +303,9 @@ impl Tracker {
     /// As far as predictions were wrong (KISS-ICP's threshold, Vizzo and others, 2023).
     fn correspondence_distance(&self) -> f64 {
         let settings = &self.settings.prediction;
-        let variance = self.squared_errors / self.predictions * self.since as f64;
+        // Once the motion is not believed to go on, looking farther takes seconds and finds nothing.
+        let steps = self.since.min(settings.max_lost);
+        let variance = self.squared_errors / self.predictions * steps as f64;
         let by_motion = settings.min_correspondence_distance.max(settings.max_deviation * variance.sqrt());
         self.fixed_correspondence_distance.unwrap_or(by_motion)
     }
