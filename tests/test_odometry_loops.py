@@ -65,6 +65,49 @@ def test_a_loop_takes_the_drift_of_its_way() -> None:
     )
 
 
+def test_covariances_after_a_loop_with_an_earlier_map_were_those_of_the_way_around() -> None:
+    """Where the map is another one, scans after the loop come with covariances that know nothing of it."""
+    true, reach = ring(80, 12.0), 8.0
+    steps = geometry.inverse(true[:-1]) @ true[1:]
+    deviation = np.array([1e-4] * 3 + [1e-3] * 3)
+    of_step = np.diag(deviation**2)
+    walk = np.zeros((80, 6, 6))
+    for scan, step in enumerate(steps):
+        to_next = geometry.adjoint(geometry.inverse(step))
+        walk[scan + 1] = to_next @ walk[scan] @ to_next.T + of_step
+    rng = np.random.default_rng(3)
+    after = []
+    for _ in range(20):
+        poses = [true[0]]
+        for number, step in enumerate(steps):
+            poses.append(poses[-1] @ step @ geometry.exp_twist(deviation * rng.normal(size=6)))
+            if number == 74:
+                before = poses[-1]
+                by_earlier = geometry.inverse(true[0]) @ true[75]
+                by_earlier = by_earlier @ geometry.exp_twist(deviation * rng.normal(size=6))
+                poses[-1] = true[0] @ by_earlier
+        loop = LoopClosure(75, 0, by_earlier, before)
+        found, covariances = closed(np.array(poses), walk, np.zeros(80, np.int64), [loop], reach)
+        off = geometry.log_pose(geometry.inverse(found[75:]) @ true[75:])
+        after.append(np.einsum("ni,nij,nj->n", off, np.linalg.inv(covariances[75:]), off) / 6)
+        np.testing.assert_array_less(np.trace(covariances[75:], axis1=1, axis2=2), 0.3 * walk[75].trace())
+    assert 0.1 < np.mean(after) < 10.0
+
+
+def test_what_a_way_around_left_open_is_known_after_a_loop_with_an_earlier_map() -> None:
+    true = ring(80, 12.0)
+    walk = np.arange(80.0)[:, None, None] * np.diag([1e-8] * 3 + [1e-6] * 3)
+    walk[30:, 3, 3] = np.inf
+    slides = np.isin(np.arange(80), [30, 31, 78])
+    loop = LoopClosure(75, 0, geometry.inverse(true[0]) @ true[75], true[75])
+    _, covariances = closed(true, walk, np.zeros(80, np.int64), [loop], 8.0, slides)
+    is_known = np.isfinite(covariances).all(axis=(1, 2))
+    # From 78 on another motion is open.
+    np.testing.assert_array_equal(np.flatnonzero(~is_known), [*range(30, 75), 78, 79])
+    # As well as that of a few steps.
+    assert 0.0 < covariances[76, 3:, 3:].trace() < 30.0 * walk[1, 3:, 3:].trace()
+
+
 def test_segments_without_a_loop_and_scans_without_a_pose_stay() -> None:
     true = ring(40, 5.0)
     given = drifted(true, np.array([0.0, 0.0, 2e-3, 0.0, 0.0, 0.0]))

@@ -38,7 +38,12 @@ class LoopClosure:
 
 
 def closed(
-    poses: Array, covariances: Array, segments: Integers, loops: Sequence[LoopClosure], reach: float
+    poses: Array,
+    covariances: Array,
+    segments: Integers,
+    loops: Sequence[LoopClosure],
+    reach: float,
+    slides: NDArray[np.bool_] | None = None,
 ) -> tuple[Array, Array]:
     """Fit poses to the motions from scan to scan and to the loops.
 
@@ -54,6 +59,8 @@ def closed(
         Of any segment.
     reach
         The length by which a rotation moves what is seen.
+    slides
+        (n,), whether the map leaves motions of a scan open; of none by default.
 
     Returns
     -------
@@ -68,7 +75,8 @@ def closed(
         if own and len(nodes) > 1:
             chain = _Chain(poses[nodes], own, number, reach)
             poses[nodes] = chain.closed()
-            covariances[nodes] = chain.factors(poses[nodes]) * covariances[nodes]
+            slide = np.zeros(len(nodes), np.bool_) if slides is None else slides[nodes]
+            covariances[nodes] = chain.covariances(poses[nodes], covariances[nodes], slide)
     return poses, covariances
 
 
@@ -109,29 +117,73 @@ class _Chain:
         """Give the poses that agree best with steps and loops."""
         return self._graph.fit(self._poses)
 
-    def factors(self, poses: Array) -> Array:
-        """Give what the loops that came later make of covariances, (n, 6, 6): factors of their entries.
+    def covariances(self, poses: Array, given: Array, slides: NDArray[np.bool_]) -> Array:
+        """Give what the loops make of given covariances, (n, 6, 6).
 
-        Each scan's covariance is that of the steps and loops before it. Those after it take the same share of
-        it as they do of a random walk's covariance, of rotations and translations.
+        Each scan's covariance is that of the steps before it, and of those loops that it knows of. The others
+        take the same share of it as they do of a random walk's covariance, of rotations and translations.
+        What the way around left open is known after a loop: there it is the random walk's, as large as the
+        given ones are to it.
         """
+        came, unknown = self._when_it_came(given)
+        result = self._factors(poses, came) * given
+        is_finite = np.isfinite(given).all(axis=(1, 2))
+        every = np.arange(len(poses))
+        before, after = _variances(given), _variances(came)
+        known = is_finite & (every < min(unknown, default=0)) & (after > 0.0).all(axis=1)
+        if known.any():
+            first = min(unknown)
+            since = every[first:][np.logical_or.accumulate(slides[first:])]
+            opened = every[~is_finite & (every >= first) & (every < min(since, default=len(poses)))]
+            scale = np.repeat(np.sqrt(np.median(before[known] / after[known], axis=0)), 3)
+            result[opened] = self._graph.covariances(poses, opened) * np.outer(scale, scale)
+        return result
+
+    def _factors(self, poses: Array, came: Array) -> Array:
+        """Give the share of a random walk's covariances that all loops leave, as factors, (n, 6, 6)."""
         some = np.unique(np.linspace(0, len(poses) - 1, min(len(poses), _COVARIANCES)).astype(np.int64))
         deviations = []
-        for covariances in (self._graph.covariances(poses, some), self._when_it_came()[some]):
-            diagonal = np.einsum("nii->ni", covariances)
-            deviations.append(np.sqrt(np.column_stack([diagonal[:, :3].sum(1), diagonal[:, 3:].sum(1)])))
+        for covariances in (self._graph.covariances(poses, some), came[some]):
+            deviations.append(np.sqrt(_variances(covariances)))
         after, before = deviations
         share = np.divide(after, before, out=np.ones_like(after), where=before > 0.0).clip(0.0, 1.0)
         every = np.arange(len(poses))
         root = np.column_stack([np.interp(every, some, share[:, part]) for part in (0, 0, 0, 1, 1, 1)])
         return np.asarray(root[:, :, None] * root[:, None, :])
 
-    def _when_it_came(self) -> Array:
-        """Give the covariances of a random walk with the loops up to each scan, (n, 6, 6)."""
+    def _when_it_came(self, given: Array) -> tuple[Array, list[int]]:
+        """Give the covariances of a random walk with the loops that given ones know of, (n, 6, 6).
+
+        They know of those within one map. After a loop with an earlier map they are those of the way around:
+        the scans of such loops come second.
+        """
+        unknown = []
         result = np.zeros((len(self._poses), 6, 6))
         for scan in range(1, len(result)):
-            earlier = self._loops.get(scan, scan - 1)
-            change = self._of_loop if scan in self._loops else self._of_steps[scan - 1]
-            to_scan = geometry.adjoint(geometry.inverse(self._poses[scan]) @ self._poses[earlier])
-            result[scan] = to_scan @ result[earlier] @ to_scan.T + np.diag(change)
-        return result
+            result[scan] = self._carried(result, scan - 1, scan, self._of_steps[scan - 1])
+            if scan in self._loops:
+                by_loop = self._carried(result, self._loops[scan], scan, self._of_loop)
+                if _has_fallen(given[scan - 1 : scan + 1], np.array([result[scan], by_loop])):
+                    result[scan] = by_loop
+                else:
+                    unknown.append(scan)
+        return result, unknown
+
+    def _carried(self, covariances: Array, start: int, end: int, change: Array) -> Array:
+        """Give the covariance of a scan by that of another one and of the pose between, (6, 6)."""
+        to_end = geometry.adjoint(geometry.inverse(self._poses[end]) @ self._poses[start])
+        return np.asarray(to_end @ covariances[start] @ to_end.T + np.diag(change))
+
+
+def _variances(covariances: Array) -> Array:
+    """Give those of rotation and of translation, (n, 2)."""
+    diagonal = np.einsum("nii->ni", covariances)
+    return np.column_stack([diagonal[:, :3].sum(1), diagonal[:, 3:].sum(1)])
+
+
+def _has_fallen(given: Array, expected: Array) -> bool:
+    """Whether the second of two covariances is below the first by most of what is expected, (2, 6, 6)."""
+    pairs = np.array([_variances(given), _variances(expected)])
+    known = np.isfinite(pairs).all(axis=(0, 1)) & (pairs > 0.0).all(axis=(0, 1))
+    ratios = np.log(pairs[:, 1] / np.where(known, pairs[:, 0], 1.0), where=known, out=np.zeros((2, 2)))
+    return bool((ratios[0] < 0.5 * ratios[1]).any())

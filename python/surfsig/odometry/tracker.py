@@ -222,7 +222,12 @@ class Tracker:
         if close_loops and loops:
             # Voxels are such that a scan fills some thousand: it sees some thirty of them far.
             arrays["poses"], arrays["covariances"] = closed(
-                arrays["poses"], arrays["covariances"], arrays["segments"], loops, _REACH * voxel
+                arrays["poses"],
+                arrays["covariances"],
+                arrays["segments"],
+                loops,
+                _REACH * voxel,
+                np.array([bool(one) for one in free], np.bool_),
             )
         return Odometry(
             **arrays,

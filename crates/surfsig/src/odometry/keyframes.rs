@@ -1,16 +1,17 @@
 //! Scans that are kept, to find a sensor again that was lost.
 
+mod ranges;
+mod search;
+
 use super::local_map::LocalMap;
-use super::scan_alignment::{ScanAlignment, align};
 use super::settings::OdometrySettings;
 use super::thinned_scan::ThinnedScan;
 use super::tracker::rotation_angle;
 use super::voxel_index::squared_distance;
-use crate::alignment::{ConsensusSettings, Correspondences};
-use crate::field::{KeypointOptions, keypoints_within, match_fields};
 use crate::visibility::SphericalRangeImage;
-use crate::{FieldOptions, FieldPlaces, Monitor, PointCloud, Radius, RigidTransform};
-use std::collections::BTreeSet;
+use crate::{FieldPlaces, RigidTransform};
+use ranges::Ranges;
+use std::collections::{BTreeSet, VecDeque};
 
 /// A scan that is kept; lengths are in voxels.
 #[allow(non_snake_case)]
@@ -22,6 +23,7 @@ struct Keyframe {
     /// Those of smaller voxels, for the signatures.
     detail: Vec<[f32; 3]>,
     range_image: SphericalRangeImage,
+    ranges: Ranges,
     /// Its keypoints, once they have been asked for.
     described: Option<FieldPlaces>,
     /// Whether the present map has what it saw.
@@ -44,13 +46,22 @@ pub(super) struct Keyframes {
     median_range: f64,
     patch_radius: f64,
     kept: Vec<Keyframe>,
-    /// The keyframe that the next search goes on from.
-    next: usize,
+    /// Numbers of those that have been searched since the sensor was found last.
+    searched: BTreeSet<u32>,
+    /// Numbers of those whose keypoints are described, the oldest description first.
+    described: VecDeque<u32>,
 }
 
 impl Keyframes {
     pub fn new(settings: &OdometrySettings, median_range: f64, patch_radius: f64) -> Self {
-        Self { settings: settings.clone(), median_range, patch_radius, kept: Vec::new(), next: 0 }
+        Self {
+            settings: settings.clone(),
+            median_range,
+            patch_radius,
+            kept: Vec::new(),
+            searched: BTreeSet::new(),
+            described: VecDeque::new(),
+        }
     }
 
     /// Keeps a scan, unless there is one of nearly the same pose; of too many keyframes the one leaves that has another
@@ -66,6 +77,7 @@ impl Keyframes {
             points: in_float32(&scan.points),
             detail: in_float32(&scan.means(settings.detail_voxel)),
             range_image: scan.range_image.clone(),
+            ranges: Ranges::new(scan.coarse.points()),
             described: None,
             is_loaded: true,
         });
@@ -134,6 +146,11 @@ impl Keyframes {
         asked.min_by(|a, b| distance(a).total_cmp(&distance(b))).filter(|nearest| distance(nearest) <= reach)
     }
 
+    /// Their scans' numbers.
+    pub fn numbers(&self) -> impl Iterator<Item = usize> + '_ {
+        self.kept.iter().map(|keyframe| keyframe.number as usize)
+    }
+
     /// The pose of a keyframe.
     pub fn pose(&self, number: u32) -> Option<RigidTransform> {
         self.kept.iter().find(|keyframe| keyframe.number == number).map(|keyframe| keyframe.T_map_scan)
@@ -190,77 +207,6 @@ impl Keyframes {
         self.kept.retain(|keyframe| !numbers.contains(&(keyframe.number as usize)));
     }
 
-    /// Of the poses that matches propose, the one that lies best on the map of the keyframes around it, and that map.
-    /// `last` is where the sensor was.
-    pub fn find(
-        &mut self,
-        scan: &ThinnedScan,
-        last: &RigidTransform,
-        map_range: f64,
-        is_believed: impl Fn(&ScanAlignment) -> bool,
-    ) -> Option<(ScanAlignment, LocalMap)> {
-        let mut best: Option<(ScanAlignment, LocalMap)> = None;
-        let distance = self.settings.relocalisation.max_correspondence_distance;
-        for pose in self.proposals(scan, last) {
-            let map = self.map_of(pose.translation.into(), map_range, |_| true);
-            let known = |pose: &RigidTransform| self.would_have_seen(pose, Which::All);
-            let Some(found) = align(scan, &map, pose, distance, &self.settings.alignment, known) else {
-                continue;
-            };
-            let is_better = best.as_ref().is_none_or(|(other, _)| found.overlap > other.overlap);
-            if is_better && is_believed(&found) {
-                best = Some((found, map));
-            }
-        }
-        best
-    }
-
-    /// The keyframes that are searched now: half of them the nearest to where the sensor was, the others in turn.
-    fn searched(&mut self, last: &RigidTransform) -> Vec<usize> {
-        let most = self.settings.relocalisation.max_keyframes.min(self.kept.len());
-        let distance = |number: &usize| (self.kept[*number].T_map_scan.translation - last.translation).norm();
-        let mut chosen: Vec<usize> = (0..self.kept.len()).collect();
-        chosen.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
-        chosen.truncate(most.div_ceil(2));
-        while chosen.len() < most {
-            self.next = self.next.checked_sub(1).unwrap_or(self.kept.len() - 1).min(self.kept.len() - 1);
-            if !chosen.contains(&self.next) {
-                chosen.push(self.next);
-            }
-        }
-        chosen
-    }
-
-    /// Poses of a scan that enough matches with a keyframe agree with, those of most matches first.
-    fn proposals(&mut self, scan: &ThinnedScan, last: &RigidTransform) -> Vec<RigidTransform> {
-        let searched = self.searched(last);
-        if searched.is_empty() {
-            return Vec::new();
-        }
-        let radius = self.patch_radius;
-        let settings = &self.settings.relocalisation;
-        let consensus = ConsensusSettings::default();
-        let ours = described(&in_float32(&scan.means(settings.detail_voxel)), radius);
-        let mut proposals: Vec<(usize, RigidTransform)> = Vec::new();
-        let mut newly_described = 0;
-        for number in searched {
-            let keyframe = &mut self.kept[number];
-            newly_described += usize::from(keyframe.described.is_none());
-            if keyframe.described.is_none() && newly_described > settings.max_described {
-                continue;
-            }
-            let theirs = keyframe.described.get_or_insert_with(|| described(&keyframe.detail, radius));
-            let matches = Correspondences::new(&match_fields(&ours, theirs, true), &ours, theirs, consensus);
-            let transform = matches.agreed_transform();
-            let agree = matches.inlier_count(&transform);
-            if agree >= settings.min_matches {
-                proposals.push((agree, keyframe.T_map_scan * transform));
-            }
-        }
-        proposals.sort_by_key(|(agree, _)| std::cmp::Reverse(*agree));
-        proposals.into_iter().take(settings.max_trials).map(|(_, pose)| pose).collect()
-    }
-
     /// The map of some of the keyframes taken within a distance of a point.
     fn map_of(&self, center: [f64; 3], distance: f64, is_in: impl Fn(&Keyframe) -> bool) -> LocalMap {
         let mut map = LocalMap::new(&self.settings.map);
@@ -274,16 +220,6 @@ impl Keyframes {
         map.keep_within(center, distance);
         map
     }
-}
-
-/// The keypoints of a scan about its sensor; none where it has no patch.
-fn described(points: &[[f32; 3]], radius: f64) -> FieldPlaces {
-    let options = FieldOptions { viewpoint: Some([0.0; 3]), ..Default::default() };
-    let found = Radius::new(radius).and_then(|radius| {
-        let (cloud, monitor) = (PointCloud::new(points), Monitor::default());
-        keypoints_within(&cloud, radius, &KeypointOptions::default(), &options, &monitor)
-    });
-    found.unwrap_or_else(|_| FieldPlaces::new(radius))
 }
 
 fn in_float32(points: &[[f64; 3]]) -> Vec<[f32; 3]> {

@@ -8,6 +8,7 @@ use crate::visibility::{SphericalRangeImage, Visibility};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 /// Distance up to which a point's neighbourhood counts as dense: those that change one are then found in the blocks
 /// next to them.
@@ -21,25 +22,30 @@ const MAX_HALF_THICKNESS: f64 = 0.7;
 
 /// One point for each voxel, the first that was seen, with the normal of the surface there.
 ///
-/// A mean over scans would move with the errors of their poses; the first point stays where it is. When points come in,
-/// normals are made anew only where the nearest neighbours are other ones than before.
+/// A mean over scans would move with the errors of their poses; the first point stays where it is. Normals are made when
+/// they are asked for, as scans only meet a part of the map. When points come in, they are made anew only where the
+/// nearest neighbours are other ones than before.
 #[derive(Debug, Clone)]
 pub(super) struct LocalMap {
     neighbors: usize,
     max_thickness: f64,
     points: Vec<[f64; 3]>,
-    /// Unit normals; 0 where neighbours are on no plane, as at edges and in thickets.
-    normals: Vec<[f64; 3]>,
+    planes: Vec<OnceLock<Plane>>,
     /// Number of the scan that each point came from.
     scans: Vec<u32>,
-    /// Squared distance to the farthest neighbour that the normal was taken from; infinite where these were too few.
-    reaches: Vec<f64>,
     /// Scans in a row that have looked through each point.
     seen_through: Vec<u8>,
     scans_through: u8,
     index: VoxelIndex,
-    /// Points whose neighbours are not within `DENSE`, by cells.
-    sparse: FxHashMap<[i32; 3], Vec<u32>>,
+}
+
+/// What a point's neighbours are on.
+#[derive(Debug, Clone, Copy)]
+struct Plane {
+    /// Unit normal; 0 where neighbours are on no plane, as at edges and in thickets.
+    normal: [f64; 3],
+    /// Squared distance to the farthest neighbour; infinite where these were too few.
+    reach: f64,
 }
 
 impl LocalMap {
@@ -48,13 +54,11 @@ impl LocalMap {
             neighbors: settings.normal_neighbors,
             max_thickness: settings.max_thickness,
             points: Vec::new(),
-            normals: Vec::new(),
+            planes: Vec::new(),
             scans: Vec::new(),
-            reaches: Vec::new(),
             seen_through: Vec::new(),
             scans_through: settings.scans_through,
             index: VoxelIndex::default(),
-            sparse: FxHashMap::default(),
         }
     }
 
@@ -68,7 +72,7 @@ impl LocalMap {
 
     /// The unit normal of a point, of which the side is open; `None` where its neighbours are on no plane.
     pub fn normal(&self, number: u32) -> Option<[f64; 3]> {
-        Some(self.normals[number as usize]).filter(|normal| *normal != [0.0; 3])
+        Some(self.plane(number).normal).filter(|normal| *normal != [0.0; 3])
     }
 
     /// Normals of two halves of the points that a point's normal is taken from; `None` where either half is on no plane.
@@ -113,55 +117,54 @@ impl LocalMap {
                 self.scans.push(scan);
             }
         }
-        self.normals.resize(self.points.len(), [0.0; 3]);
-        self.reaches.resize(self.points.len(), f64::INFINITY);
+        self.planes.resize(self.points.len(), OnceLock::new());
         self.seen_through.resize(self.points.len(), 0);
-        self.renew_normals(before);
+        self.forget_planes(before);
     }
 
-    /// Makes the normals of points from a number on, and of all whose neighbours they have become.
-    fn renew_normals(&mut self, first_new: usize) {
-        let mut changed = vec![false; self.points.len()];
-        changed[first_new..].fill(true);
-        for new in &self.points[first_new..] {
-            let mut mark = |number: u32| {
+    /// The plane that a point's neighbours are on.
+    fn plane(&self, number: u32) -> &Plane {
+        self.planes[number as usize].get_or_init(|| {
+            let mut found = Vec::with_capacity(8 * self.neighbors);
+            self.index.nearest_k(&self.points, self.points[number as usize], self.neighbors, &mut found);
+            let reach = if found.len() < self.neighbors { f64::INFINITY } else { found[found.len() - 1].0 };
+            let plane = plane_of(found.iter().map(|(_, index)| self.points[*index as usize]));
+            let is_thin = plane.thickness <= self.max_thickness;
+            Plane { normal: if is_thin { plane.normal } else { [0.0; 3] }, reach }
+        })
+    }
+
+    /// Forgets the planes of points whose neighbours those from a number on have become.
+    fn forget_planes(&mut self, first_new: usize) {
+        // Points whose neighbours are not within `DENSE`, by cells.
+        let mut sparse: FxHashMap<[i32; 3], Vec<u32>> = FxHashMap::default();
+        let mut is_any_made = false;
+        for (number, (point, plane)) in (0..).zip(self.points.iter().zip(&self.planes)) {
+            let Some(plane) = plane.get() else { continue };
+            is_any_made = true;
+            if plane.reach > DENSE * DENSE {
+                sparse.entry(cell_of(point)).or_default().push(number);
+            }
+        }
+        if !is_any_made {
+            return;
+        }
+        let (points, planes) = (&self.points, &mut self.planes);
+        for new in &points[first_new..] {
+            let mut forget = |number: u32| {
                 let other = number as usize;
-                changed[other] |= squared_distance(&self.points[other], new) <= self.reaches[other];
+                let is_changed = |plane: &Plane| squared_distance(&points[other], new) <= plane.reach;
+                if planes[other].get().is_some_and(is_changed) {
+                    planes[other] = OnceLock::new();
+                }
             };
-            self.index.visit(*new, DENSE, &mut mark);
+            self.index.visit(*new, DENSE, &mut forget);
             let [x, y, z] = cell_of(new);
             for neighbor in 0..27 {
                 let cell = [x + neighbor % 3 - 1, y + neighbor / 3 % 3 - 1, z + neighbor / 9 - 1];
-                self.sparse.get(&cell).into_iter().flatten().copied().for_each(&mut mark);
+                sparse.get(&cell).into_iter().flatten().copied().for_each(&mut forget);
             }
         }
-        let numbers: Vec<u32> =
-            (0..).zip(&changed).filter_map(|(number, changed)| changed.then_some(number)).collect();
-        let made: Vec<([f64; 3], f64)> = numbers
-            .par_iter()
-            .with_min_len(64)
-            .map_init(Vec::new, |found, number| {
-                self.index.nearest_k(&self.points, self.points[*number as usize], self.neighbors, found);
-                let reach =
-                    if found.len() < self.neighbors { f64::INFINITY } else { found[found.len() - 1].0 };
-                let plane = plane_of(found.iter().map(|(_, index)| self.points[*index as usize]));
-                let is_thin = plane.thickness <= self.max_thickness;
-                (if is_thin { plane.normal } else { [0.0; 3] }, reach)
-            })
-            .collect();
-        for (number, (normal, reach)) in numbers.into_iter().zip(made) {
-            let (index, is_new) = (number as usize, number as usize >= first_new);
-            let was_sparse = !is_new && self.reaches[index] > DENSE * DENSE;
-            if reach > DENSE * DENSE && !was_sparse {
-                self.sparse.entry(cell_of(&self.points[index])).or_default().push(number);
-            }
-            (self.normals[index], self.reaches[index]) = (normal, reach);
-        }
-        let reaches = &self.reaches;
-        self.sparse.retain(|_, numbers| {
-            numbers.retain(|number| reaches[*number as usize] > DENSE * DENSE);
-            !numbers.is_empty()
-        });
     }
 
     /// Counts for each point the scans in a row that looked through it: something that has moved on is no part of the
@@ -187,17 +190,12 @@ impl LocalMap {
             return;
         }
         keep(&mut self.points, &near);
-        keep(&mut self.normals, &near);
+        keep(&mut self.planes, &near);
         keep(&mut self.scans, &near);
-        keep(&mut self.reaches, &near);
         keep(&mut self.seen_through, &near);
         self.index = VoxelIndex::default();
-        self.sparse.clear();
-        for (number, (point, reach)) in (0..).zip(self.points.iter().zip(&self.reaches)) {
+        for (number, point) in (0..).zip(&self.points) {
             self.index.insert(*point, number);
-            if *reach > DENSE * DENSE {
-                self.sparse.entry(cell_of(point)).or_default().push(number);
-            }
         }
     }
 }
@@ -209,7 +207,7 @@ impl GicpTarget for LocalMap {
     }
 
     fn surface(&self, number: u32) -> ([f64; 3], [f64; 3]) {
-        (self.points[number as usize], self.normals[number as usize])
+        (self.points[number as usize], self.plane(number).normal)
     }
 }
 
@@ -245,14 +243,15 @@ mod tests {
     fn largest_error_of_normals(map: &LocalMap) -> f64 {
         let tree = KdTree::new(map.points());
         let mut found = Vec::new();
-        let error = |(point, normal): (&[f64; 3], &[f64; 3])| {
+        let error = |(number, point): (u32, &[f64; 3])| {
+            let normal = map.normal(number).unwrap_or_default();
             tree.nearest_k(*point, 20, &mut found);
             let plane = plane_of(found.iter().map(|(_, index)| map.points()[*index as usize]));
             let expected = if plane.thickness <= 0.35 { plane.normal } else { [0.0; 3] };
             let along: f64 = (0..3).map(|k| expected[k] * normal[k]).sum();
             (0..3).map(|k| (normal[k] - expected[k].copysign(expected[k] * along)).abs()).fold(0.0, f64::max)
         };
-        map.points().iter().zip(&map.normals).map(error).fold(0.0, f64::max)
+        (0..).zip(map.points()).map(error).fold(0.0, f64::max)
     }
 
     /// Whether a noisy floor, with a step of a height in its middle, holds what moves along x.
@@ -322,7 +321,11 @@ mod tests {
                 1..6,
             ),
         ) {
-            prop_assert!(largest_error_of_normals(&map_of(&scans)) < 1e-6);
+            let mut map = LocalMap::new(&MapSettings::default());
+            for (number, points) in (0..).zip(&scans) {
+                map.add(points.iter().copied(), number);
+                prop_assert!(largest_error_of_normals(&map) < 1e-6);
+            }
         }
     }
 }

@@ -14,11 +14,14 @@ use crate::alignment::{
 use crate::random::some_of;
 use crate::statistics::{DEVIATIONS_PER_MEDIAN, median};
 use nalgebra::{Matrix6, Vector3, Vector6};
+use rayon::prelude::*;
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 /// Eigenvalues of the normal matrix below this share of the largest are rounding: no step goes there.
 const ROUNDING: f64 = 1e-9;
+/// Points that one thread takes at a time.
+const PART: usize = 256;
 /// What a correspondence would have to say about a motion that steps leave out, in what one along its normal says.
 const FIXED: f64 = 1e6;
 
@@ -226,8 +229,9 @@ impl PointToPlane {
             Some(normal.dot(&(moved - Vector3::from(map.points()[index as usize]))))
         };
         let residuals: Vec<Option<f64>> = found
-            .iter()
+            .par_iter()
             .zip(points)
+            .with_min_len(PART)
             .map(|(other, point)| other.and_then(|(index, _)| residual(index, point)))
             .collect();
         let sizes: Vec<f64> = residuals.iter().flatten().map(|residual| residual.abs()).collect();

@@ -49,8 +49,8 @@ pub(super) struct Segments {
     count: usize,
     /// Worlds so far.
     worlds: usize,
-    /// Scans so far that were searched in a past map.
-    searched: usize,
+    /// Scans that have been lost since the last one with a pose: they are searched in one map each.
+    lost: usize,
     /// The last scan that was looked for in a past map to close a loop.
     last_loop_search: Option<usize>,
 }
@@ -64,7 +64,7 @@ impl Segments {
             anchor: None,
             count: 0,
             worlds: 0,
-            searched: 0,
+            lost: 0,
             last_loop_search: None,
         }
     }
@@ -96,6 +96,8 @@ impl Segments {
         let segment = &mut present[0];
         let scan = segment.thinned(&measured, &self.settings);
         let mut followed = Followed { is_thin: scan.is_none(), ..Followed::default() };
+        let turn = turn_to_search(past, segment, self.lost);
+        segment.tracker.search_keyframes(turn == Turn::Present);
         let is_unfit = segment.is_unfit(scan.as_ref(), measured.points.len(), &self.settings);
         let steps = segment.follow(scan.as_ref());
         followed.disproved =
@@ -114,11 +116,12 @@ impl Segments {
             followed.loops.extend(found);
         }
         followed.found = steps.iter().map(|step| segment.found(step)).collect();
-        let returned = steps.is_empty().then(|| search_past(past, &measured, self.searched, &self.settings));
-        if returned.is_none() {
-            past.iter_mut().for_each(|segment| segment.tracker.skip());
-        }
-        if let Some(Some((index, found))) = returned {
+        let searched = match turn {
+            Turn::Past(index) if steps.is_empty() => Some(index),
+            _ => None,
+        };
+        if let Some((index, found)) = search_past(past, &measured, searched, &self.settings) {
+            self.lost = 0;
             followed.found = found;
             followed.is_thin = false;
             let segment = self.segments.remove(index);
@@ -127,7 +130,7 @@ impl Segments {
             self.candidate = None;
             return followed;
         }
-        self.searched += usize::from(returned.is_some());
+        self.lost = if steps.is_empty() { self.lost + 1 } else { 0 };
         if steps.is_empty() || is_unfit {
             let needed = match steps.is_empty() {
                 true => self.settings.segments.scans_lost,
@@ -183,6 +186,8 @@ impl Segments {
             {
                 return;
             }
+            // A scan that is lost in a map of its own ends that: nothing is searched there.
+            segment.tracker.search_keyframes(false);
             let scan = segment.thinned(measured, &self.settings);
             let steps = segment.follow(scan.as_ref());
             if steps.is_empty() {
@@ -289,19 +294,35 @@ fn closed_with_past(
     })
 }
 
+/// The map whose keyframes a scan is searched among: the present one's first, for a search costs several tracked scans.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Turn {
+    Present,
+    Past(usize),
+}
+
+fn turn_to_search(past: &[Segment], present: &Segment, lost: usize) -> Turn {
+    if present.tracker.is_on_trial() {
+        return Turn::Present;
+    }
+    // A trial goes on with the next scan; otherwise it is another map's turn, the latest first.
+    let on_trial = past.iter().position(|segment| segment.tracker.is_on_trial());
+    let by_turns = (lost % (past.len() + 1)).checked_sub(1).map(|turn| past.len() - 1 - turn);
+    on_trial.or(by_turns).map_or(Turn::Present, Turn::Past)
+}
+
 /// Searches a scan in one of the past maps, in which it then goes on: its index, and the poses that are found.
 fn search_past(
     past: &mut [Segment],
     measured: &MeasuredScan,
-    searched: usize,
+    searched: Option<usize>,
     settings: &OdometrySettings,
 ) -> Option<(usize, Vec<FoundPose>)> {
-    // A trial goes on with the next scan; otherwise it is another map's turn.
-    let on_trial = past.iter().position(|segment| segment.tracker.is_on_trial());
-    let chosen = on_trial.or((!past.is_empty()).then(|| searched % past.len()))?;
-    let others = past.iter_mut().enumerate().filter(|(index, _)| *index != chosen);
+    let others = past.iter_mut().enumerate().filter(|(index, _)| Some(*index) != searched);
     others.for_each(|(_, segment)| segment.tracker.skip());
+    let chosen = searched?;
     let segment = &mut past[chosen];
+    segment.tracker.search_keyframes(true);
     let scan = segment.thinned(measured, settings);
     let steps = segment.follow(scan.as_ref());
     (!steps.is_empty()).then(|| (chosen, steps.iter().map(|step| segment.found(step)).collect()))

@@ -21,6 +21,7 @@ use crate::RigidTransform;
 use crate::alignment::FreeDirection;
 use crate::statistics::quantile;
 use nalgebra::Vector6;
+use std::collections::BTreeMap;
 
 /// Share of a scan's points that the map's range is taken from.
 const MOST: f64 = 0.99;
@@ -55,8 +56,8 @@ pub(super) struct Tracker {
     map_range: f64,
     map: LocalMap,
     keyframes: Keyframes,
-    /// Poses and covariances of the scans that are in the map, by their numbers.
-    mapped: Vec<Option<(RigidTransform, Covariance)>>,
+    /// Poses and covariances of the scans that are in the map, and of keyframes, by their numbers.
+    mapped: BTreeMap<usize, (RigidTransform, Covariance)>,
     last: RigidTransform,
     /// From a scan to the next one.
     motion: RigidTransform,
@@ -80,6 +81,8 @@ pub(super) struct Tracker {
     first: Option<ThinnedScan>,
     /// Scans since the last search.
     since_search: usize,
+    /// Whether it is this map's turn to search its keyframes.
+    searches_keyframes: bool,
     /// Numbers of the scans up to the last one whose poses were kept though doubted.
     doubted: Vec<usize>,
     /// Numbers of the scans whose poses a later one has disproved, until they are asked for.
@@ -103,7 +106,7 @@ impl Tracker {
             map_range: 0.0,
             map: LocalMap::new(&settings.map),
             keyframes: Keyframes::new(settings, median_range, in_voxels(scale.patch_radius)),
-            mapped: Vec::new(),
+            mapped: BTreeMap::new(),
             last: RigidTransform::identity(),
             motion: RigidTransform::identity(),
             has_motion: false,
@@ -118,6 +121,7 @@ impl Tracker {
             last_mapped: None,
             first: None,
             since_search: usize::MAX,
+            searches_keyframes: true,
             doubted: Vec::new(),
             disproved: Vec::new(),
             loops: Vec::new(),
@@ -129,6 +133,11 @@ impl Tracker {
     /// Whether poses of the last scans wait for the next ones.
     pub fn is_on_trial(&self) -> bool {
         !self.trial.is_empty()
+    }
+
+    /// Lets the next scans be searched among this map's keyframes, or not.
+    pub fn search_keyframes(&mut self, searches: bool) {
+        self.searches_keyframes = searches;
     }
 
     /// Whether the last scan has become a keyframe, and its pose is beyond doubt.
@@ -260,9 +269,7 @@ impl Tracker {
         if is_elsewhere && !self.trial_is_there {
             self.disproved = std::mem::take(&mut self.doubted);
             for number in &self.disproved {
-                if let Some(pose) = self.mapped.get_mut(*number) {
-                    *pose = None;
-                }
+                self.mapped.remove(number);
             }
             self.keyframes.remove(&self.disproved);
         } else if self.expectation.is_met(found) {
@@ -296,7 +303,9 @@ impl Tracker {
     /// As far as predictions were wrong (KISS-ICP's threshold, Vizzo and others, 2023).
     fn correspondence_distance(&self) -> f64 {
         let settings = &self.settings.prediction;
-        let variance = self.squared_errors / self.predictions * self.since as f64;
+        // Once the motion is not believed to go on, looking farther takes seconds and finds nothing.
+        let steps = self.since.min(settings.max_lost);
+        let variance = self.squared_errors / self.predictions * steps as f64;
         let by_motion = settings.min_correspondence_distance.max(settings.max_deviation * variance.sqrt());
         self.fixed_correspondence_distance.unwrap_or(by_motion)
     }

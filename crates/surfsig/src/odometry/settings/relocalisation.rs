@@ -39,12 +39,20 @@ pub struct RelocalisationSettings {
     pub keyframe_distance: f64,
     /// Rotation between keyframes nearer than that, in radians.
     pub keyframe_rotation: f64,
-    /// Keyframes that are searched for one scan, at most: the nearest to where the sensor was last, and as many others
-    /// in turn, so that a search costs a few tracked scans.
+    /// Keyframes that are searched for one scan, at most: the nearest to where the sensor was last, and as many others,
+    /// those first that see about as far, so that a search costs a few tracked scans.
     pub max_keyframes: usize,
     /// Of these, keyframes whose keypoints are described for one scan, at most: that takes longer than all else, and is
-    /// done once for each.
+    /// done once for each. The next scan that is searched goes on.
     pub max_described: usize,
+    /// Keyframes of a map whose descriptions are kept, at most: each takes some 1.3 MB.
+    pub max_descriptions: usize,
+    /// Keypoints of a scan and of a keyframe, at most. Of eight places that `carry_away` of `benchmarks/odometry.py` takes
+    /// a lidar to (seeds 601 and 602), all were found with 800, and seven with 400.
+    pub keypoints: usize,
+    /// Voxels along the radius of a keypoint's patch, of which each gives one candidate. With 4 as many of these places
+    /// were found as with 8, and to describe a scan took half of the time.
+    pub candidates_per_radius: f64,
     /// Keyframes that are kept, at most: each takes some 300 kB.
     pub max_kept: usize,
     /// Scans after which a keyframe that is not in the map any more may be one that the sensor comes back to.
@@ -76,7 +84,8 @@ pub struct RelocalisationSettings {
     pub rotation_trials: usize,
     /// Matches that agree with a pose that is tried, at least.
     pub min_matches: usize,
-    /// Poses that are tried on the keyframes' map, at most, those first that most matches agree with.
+    /// Poses that are tried on the keyframes' map, at most, those that most matches agree with: the one by which most
+    /// points come near the map is aligned.
     pub max_trials: usize,
     /// Edge of the voxels of which keypoints are described, in voxels of the map: signatures need more points than a
     /// pose does.
@@ -101,7 +110,10 @@ impl Default for RelocalisationSettings {
             keyframe_distance: 0.3,
             keyframe_rotation: 30.0_f64.to_radians(),
             max_keyframes: 16,
-            max_described: 8,
+            max_described: 4,
+            max_descriptions: 64,
+            keypoints: 800,
+            candidates_per_radius: 4.0,
             max_kept: 400,
             scans_apart: 30,
             loop_distance: 0.6,
@@ -115,7 +127,7 @@ impl Default for RelocalisationSettings {
             rotation_distance: 1.5,
             clear_gain: 0.1,
             rotation_trials: 2,
-            min_matches: 24,
+            min_matches: 16,
             max_trials: 3,
             detail_voxel: 0.5,
             observers: 4,

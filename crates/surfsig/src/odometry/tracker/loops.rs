@@ -71,7 +71,7 @@ impl Tracker {
         self.map.add_moved(&present, &correction);
         self.keyframes.move_loaded(&correction);
         for number in numbers {
-            if let Some(Some((pose, _))) = self.mapped.get_mut(number as usize) {
+            if let Some((pose, _)) = self.mapped.get_mut(&(number as usize)) {
                 *pose = correction * *pose;
             }
         }

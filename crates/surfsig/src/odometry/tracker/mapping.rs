@@ -8,6 +8,7 @@ use super::{Step, Tracker, rotation_angle};
 use crate::RigidTransform;
 use crate::alignment::{orthonormal, unscaled};
 use nalgebra::Vector3;
+use std::collections::BTreeSet;
 
 impl Tracker {
     /// Adds the error of the map, which is that of the scans that it was made of.
@@ -15,7 +16,7 @@ impl Tracker {
         let to_scan = found.T_map_scan.inverse();
         let mut of_map = Covariance::zeros();
         for &(number, share) in &found.scans {
-            if let Some((pose, of_scan)) = &self.mapped[number as usize] {
+            if let Some((pose, of_scan)) = self.mapped.get(&(number as usize)) {
                 let carried = of_scan.carried(&(to_scan * *pose));
                 of_map.random += carried.random * share;
                 of_map.systematic += carried.systematic * share;
@@ -53,11 +54,21 @@ impl Tracker {
         let is_near = |point: &&[f64; 3]| Vector3::from(**point).norm() <= self.map_range;
         let near = points.iter().filter(is_near).map(|point| pose.transform_point(*point));
         self.map.add(near, number);
-        self.mapped.resize(step.number + 1, None);
-        self.mapped[step.number] = Some((pose, step.covariance));
+        self.mapped.insert(step.number, (pose, step.covariance));
         self.is_at_keyframe = self.keyframes.offer(scan, &pose, number);
+        if self.is_at_keyframe {
+            self.forget_scans();
+        }
         self.last_mapped = Some(pose);
         steps
+    }
+
+    /// Forgets poses of scans that are neither in the map nor in that of a keyframe: memory is that of the surroundings,
+    /// however long the way is.
+    fn forget_scans(&mut self) {
+        let mut needed: BTreeSet<usize> = self.map.scans().iter().map(|number| *number as usize).collect();
+        needed.extend(self.keyframes.numbers());
+        self.mapped.retain(|number, _| needed.contains(number));
     }
 
     /// Whether the sensor went on since the last scan of the map.

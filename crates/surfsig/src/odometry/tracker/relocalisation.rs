@@ -95,6 +95,9 @@ impl Tracker {
         scan: &ThinnedScan,
         doubted: Option<&ScanAlignment>,
     ) -> Option<(ScanAlignment, LocalMap)> {
+        if !self.searches_keyframes {
+            return None;
+        }
         let (expectation, median_range) = (&self.expectation, self.median_range);
         let is_met = |found: &ScanAlignment| {
             found.free_directions.is_empty()
@@ -138,5 +141,27 @@ impl Tracker {
         let gain = self.settings.relocalisation.overlap_gain;
         apart > self.settings.prediction.min_correspondence_distance
             && (searched.overlap > doubted.overlap + gain || self.expectation.is_contradicted(doubted))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::scale::Scale;
+    use super::super::super::settings::OdometrySettings;
+    use super::*;
+
+    #[test]
+    fn a_map_left_long_ago_looked_for_correspondences_ever_farther() {
+        let settings = OdometrySettings::default();
+        let points: Vec<[f64; 3]> =
+            (0..3000).map(|i| [0, 1, 2].map(|k| 5.0 * (f64::from(3 * i + k) * 12.9898).sin())).collect();
+        let mut tracker = Tracker::new(&settings, &Scale::new(&points, None, &settings.scale));
+        let mut after = |scans: usize| {
+            (0..scans).for_each(|_| tracker.skip());
+            tracker.correspondence_distance()
+        };
+        assert!(after(1) < after(1));
+        let far = after(10);
+        assert_eq!(after(1000), far);
     }
 }

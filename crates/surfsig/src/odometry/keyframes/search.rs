@@ -1,0 +1,134 @@
+//! Where a sensor is that was lost: the keyframes whose keypoints its scan's match.
+
+use super::super::local_map::LocalMap;
+use super::super::rotation_search::{points_near, some_points};
+use super::super::scan_alignment::{ScanAlignment, align};
+use super::super::settings::RelocalisationSettings;
+use super::super::thinned_scan::ThinnedScan;
+use super::ranges::Ranges;
+use super::{Keyframes, Which, in_float32};
+use crate::alignment::{ConsensusSettings, Correspondences};
+use crate::field::{KeypointOptions, keypoints_within, match_fields};
+use crate::{FieldOptions, FieldPlaces, Monitor, PointCloud, Radius, RigidTransform};
+
+impl Keyframes {
+    /// Of the poses that matches propose, the one that lies best on the map of the keyframes around it, and that map.
+    /// `last` is where the sensor was.
+    pub fn find(
+        &mut self,
+        scan: &ThinnedScan,
+        last: &RigidTransform,
+        map_range: f64,
+        is_believed: impl Fn(&ScanAlignment) -> bool,
+    ) -> Option<(ScanAlignment, LocalMap)> {
+        let proposals = self.proposals(scan, last);
+        let settings = &self.settings.relocalisation;
+        let some = some_points(scan.coarse.points(), settings.rotation_points);
+        let on_map = |pose: RigidTransform| {
+            let map = self.map_of(pose.translation.into(), map_range, |_| true);
+            let near = points_near(&some, &map, &pose, settings.rotation_distance);
+            (near, pose, map)
+        };
+        // To align costs as much as a tracked scan does; of equally good ones the first has most matches.
+        let best = proposals.into_iter().map(on_map).rev().max_by_key(|(near, ..)| *near);
+        let found = best.and_then(|(_, pose, map)| {
+            let known = |pose: &RigidTransform| self.would_have_seen(pose, Which::All);
+            let distance = settings.max_correspondence_distance;
+            let found = align(scan, &map, pose, distance, &self.settings.alignment, known)?;
+            is_believed(&found).then_some((found, map))
+        });
+        if found.is_some() {
+            self.searched.clear();
+        }
+        found
+    }
+
+    /// The keyframes that are searched now: half of them the nearest to where the sensor was, the others those that see
+    /// about as far as the scan, of these first what has not been searched.
+    fn chosen(&mut self, scan: &ThinnedScan, last: &RigidTransform) -> Vec<usize> {
+        let most = self.settings.relocalisation.max_keyframes.min(self.kept.len());
+        let distance = |number: &usize| (self.kept[*number].T_map_scan.translation - last.translation).norm();
+        let ranges = Ranges::new(scan.coarse.points());
+        let difference = |number: &usize| self.kept[*number].ranges.difference(&ranges);
+        let mut nearest: Vec<usize> = (0..self.kept.len()).collect();
+        nearest.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let mut alike: Vec<usize> = nearest.split_off(most.div_ceil(2));
+        if alike.iter().all(|number| self.searched.contains(&self.kept[*number].number)) {
+            self.searched.clear();
+        }
+        alike.sort_by(|a, b| {
+            let is_searched = |number: &usize| self.searched.contains(&self.kept[*number].number);
+            is_searched(a).cmp(&is_searched(b)).then(difference(a).total_cmp(&difference(b)))
+        });
+        alike.truncate(most - nearest.len());
+        // By turns, so that the likeliest of either kind come first.
+        let mut chosen = Vec::new();
+        let mut alike = alike.into_iter();
+        for number in nearest {
+            chosen.extend([alike.next(), Some(number)].into_iter().flatten());
+        }
+        chosen
+    }
+
+    /// Poses of a scan that enough matches with a keyframe agree with, those of most matches first.
+    fn proposals(&mut self, scan: &ThinnedScan, last: &RigidTransform) -> Vec<RigidTransform> {
+        let chosen = self.chosen(scan, last);
+        if chosen.is_empty() {
+            return Vec::new();
+        }
+        let radius = self.patch_radius;
+        let settings = &self.settings.relocalisation;
+        let consensus = ConsensusSettings::default();
+        let ours = described(&in_float32(&scan.means(settings.detail_voxel)), radius, settings);
+        let mut proposals: Vec<(usize, RigidTransform)> = Vec::new();
+        let mut newly_described = 0;
+        for number in chosen {
+            let keyframe = &mut self.kept[number];
+            newly_described += usize::from(keyframe.described.is_none());
+            if keyframe.described.is_none() && newly_described > settings.max_described {
+                continue;
+            }
+            if keyframe.described.is_none() {
+                self.described.push_back(keyframe.number);
+            }
+            let theirs =
+                keyframe.described.get_or_insert_with(|| described(&keyframe.detail, radius, settings));
+            self.searched.insert(keyframe.number);
+            let matches = Correspondences::new(&match_fields(&ours, theirs, true), &ours, theirs, consensus);
+            let transform = matches.agreed_transform();
+            let agree = matches.inlier_count(&transform);
+            if agree >= settings.min_matches {
+                proposals.push((agree, keyframe.T_map_scan * transform));
+            }
+        }
+        self.forget_descriptions();
+        proposals.sort_by_key(|(agree, _)| std::cmp::Reverse(*agree));
+        proposals.truncate(self.settings.relocalisation.max_trials);
+        proposals.into_iter().map(|(_, pose)| pose).collect()
+    }
+
+    /// Forgets the oldest descriptions, where there are too many: each takes more than all else of its keyframe.
+    fn forget_descriptions(&mut self) {
+        while self.described.len() > self.settings.relocalisation.max_descriptions {
+            let oldest = self.described.pop_front();
+            if let Some(keyframe) = self.kept.iter_mut().find(|keyframe| Some(keyframe.number) == oldest) {
+                keyframe.described = None;
+            }
+        }
+    }
+}
+
+/// The keypoints of a scan about its sensor; none where it has no patch.
+fn described(points: &[[f32; 3]], radius: f64, settings: &RelocalisationSettings) -> FieldPlaces {
+    let options = FieldOptions { viewpoint: Some([0.0; 3]), ..Default::default() };
+    let keypoints = KeypointOptions {
+        count: settings.keypoints,
+        candidates_per_radius: settings.candidates_per_radius,
+        ..Default::default()
+    };
+    let found = Radius::new(radius).and_then(|radius| {
+        let (cloud, monitor) = (PointCloud::new(points), Monitor::default());
+        keypoints_within(&cloud, radius, &keypoints, &options, &monitor)
+    });
+    found.unwrap_or_else(|_| FieldPlaces::new(radius))
+}
