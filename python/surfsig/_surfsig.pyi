@@ -239,7 +239,7 @@ class RegistrationSettings:
         """Distances from the surface over the points' paths, below which a motion is weakly held."""
     @property
     def rival_held_share(self) -> float:
-        """Share of what the target's normals say about a weak motion that both scans' say alike, to hold it."""
+        """Share of what the target's normals say of a weak motion that both scans' say alike, to hold it."""
     @property
     def rival_held_deviations(self) -> float:
         """What both say alike, in standard errors, likewise."""

@@ -65,7 +65,7 @@ settings_class! {
         rival_distance: f64 = rivals.distance,
         /// Distances from the surface over the points' paths, below which a motion is weakly held.
         rival_weak: f64 = rivals.weak,
-        /// Share of what the target's normals say about a weak motion that both scans' say alike, to hold it.
+        /// Share of what the target's normals say of a weak motion that both scans' say alike, to hold it.
         rival_held_share: f64 = rivals.held_share,
         /// What both say alike, in standard errors, likewise.
         rival_held_deviations: f64 = rivals.held_deviations,

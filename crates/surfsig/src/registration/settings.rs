@@ -191,8 +191,8 @@ pub struct FaceSettings {
     /// explained up to 0.17, right ones of scans with 30 % in common 0.22 and more.
     pub certain_score: f64,
     /// Share of the points in free space up to which a transform is trusted that explains half (`certain_explained`) and
-    /// is better than all others that take faces onto faces: at most 0.01 of right ones in corridors with niches; 0.02
-    /// and more of wrong ones that lay a room onto one of the same size.
+    /// is better than all others that take faces onto faces: at most 0.013 of right ones in 38 corridors with niches
+    /// (`benchmarks/trust.py`); 0.02 and more of wrong ones that lay a room onto one of the same size.
     pub certain_free_space: f64,
     /// What the next one explains over what the best one does, at most, for that to be trusted: up to 0.56 beside right
     /// ones.
@@ -210,7 +210,7 @@ impl Default for FaceSettings {
             least_in_sight: 0.05,
             candidates: 12,
             certain_score: 0.2,
-            certain_free_space: 0.01,
+            certain_free_space: 0.015,
             rival_share: 0.6,
         }
     }

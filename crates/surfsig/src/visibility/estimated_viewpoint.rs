@@ -300,13 +300,12 @@ mod tests {
     use crate::random::uniform;
     use std::f64::consts::PI;
 
-    /// Walls of a room of 6 x 5 x 2.5 with a pillar, measured from a place in it in directions by chance, of which more
-    /// than one in so many lies near the poles.
+    /// Walls of a room of 6 x 5 x 2.5 with a pillar, measured from a place in it in directions by chance.
     fn room(viewpoint: [f64; 3], is_even: bool) -> Vec<[f64; 3]> {
         let ray = |i: usize| -> [f64; 3] {
             let (u, v) = (2.0 * uniform(i, 3) - 1.0, 2.0 * PI * uniform(i, 4));
-            // Evenly over directions, or, as a lidar with lines, over elevations.
-            let z = if is_even { u } else { (0.45 * PI * u).sin() };
+            // Evenly over directions, or, as a lidar with lines, over elevations, up to 60 degrees.
+            let z = if is_even { u } else { (PI / 3.0 * u).sin() };
             [(1.0 - z * z).sqrt() * v.cos(), (1.0 - z * z).sqrt() * v.sin(), z]
         };
         let hit = |ray: [f64; 3]| {
