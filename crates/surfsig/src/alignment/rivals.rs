@@ -182,9 +182,9 @@ impl<S: FittedSurface> Rivals<'_, S> {
         Explained::new(self.closeness(&self.T_target_source), &self.surface.places(self.source))
     }
 
-    /// Whether another transform explains so much less that it is no chance.
-    pub fn refutes(&self, other: &RigidTransform) -> bool {
-        self.is_refuted(&self.explained(), &self.closeness(other), self.settings.deficit)
+    /// Whether another transform explains so much less that it is no chance, by more than a share that is allowed.
+    pub fn refutes(&self, other: &RigidTransform, allowed: f64) -> bool {
+        self.is_refuted(&self.explained(), &self.closeness(other), allowed)
     }
 
     fn closeness(&self, transform: &RigidTransform) -> Closeness {

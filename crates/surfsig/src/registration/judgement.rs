@@ -118,7 +118,7 @@ impl Judge<'_> {
         // Where the source's mirror image explains more, faces prove nothing. Where it explains as much, as in corridors
         // whose ceilings are like their floors, the mirror image is a scan of the same place.
         let is_of_one_hand = |faces: &Faces<'_>| {
-            !faces.mirrored.iter().any(|&mirrored| self.is_refuted_by_mirror(found, mirrored))
+            !faces.mirrored.iter().any(|&mirrored| self.is_refuted_by_mirror(found, free_space, mirrored))
         };
         let support = Support { faces: support.faces.filter(is_of_one_hand), ..support };
         self.doubt(found, support, &mut judged);
@@ -133,14 +133,28 @@ impl Judge<'_> {
         found.free_directions([source, target], reach, weak, self.settings.rivals.held())
     }
 
-    /// Whether a transform of the source's mirror image explains more than the one that was found, by more than chance.
-    pub fn is_refuted_by_mirror(&self, found: &PointToSurface, mirrored: RigidTransform) -> bool {
+    /// Whether a transform of the source's mirror image explains more than the one that was found, by more than chance,
+    /// and leaves no more than that does in free space; or leaves less there, and explains nearly as much.
+    pub fn is_refuted_by_mirror(
+        &self,
+        found: &PointToSurface,
+        free_space: f64,
+        mirrored: RigidTransform,
+    ) -> bool {
+        let settings = self.settings;
         let some = self.some(self.sample);
         let is_hidden = |point: [f64; 3]| self.sensors.is_hidden_from_target(point);
-        let fitted = self.surface.align(&some, mirrored, &self.settings.rival_fit);
-        fitted.is_some_and(|fitted| {
-            self.rivals(found, fitted.T_target_source, &some, &is_hidden).refutes(&found.T_target_source)
-        })
+        let Some(fitted) = self.surface.align(&some, mirrored, &settings.rival_fit) else { return false };
+        let rivals_of = |transform| self.rivals(found, transform, &some, &is_hidden);
+        let (own, image) = (found.T_target_source, fitted.T_target_source);
+        let excess = self.sensors.free_space(&image) - free_space;
+        // NaN refutes nothing.
+        if excess < -settings.free_space.excess {
+            !rivals_of(own).refutes(&image, settings.free_space.deficit)
+        } else {
+            (excess.is_nan() || excess <= settings.free_space.excess)
+                && rivals_of(image).refutes(&own, settings.rivals.deficit)
+        }
     }
 
     /// Those of points that tell transforms apart.

@@ -163,7 +163,7 @@ fn registered(
         if agreement < settings.doubted_agreement {
             let (inliers, transform) = mirrored(source, target, patch, settings, monitor)?;
             if inliers as f64 > settings.mirrored_inliers * own as f64
-                && trial.judge.is_refuted_by_mirror(&found, transform)
+                && trial.judge.is_refuted_by_mirror(&found, judged.free_space, transform)
             {
                 judged.doubts.push(Doubt::Mirrored { inliers });
             }
