@@ -54,12 +54,16 @@ class Pair:
     degrees: float
     distance: float
 
-    def overlap(self) -> float:
-        """Give the share of the source that the target has, too."""
-        moved = geometry.transform_points(self.truth, self.source.points[::5].astype(np.float64))
+    def in_common(self, step: int) -> NDArray[np.bool_]:
+        """Tell which of the source's points, one in so many, the target has, too."""
+        moved = geometry.transform_points(self.truth, self.source.points[::step].astype(np.float64))
         tree = cKDTree(self.target.points)
         reach = NEAR[self.kind]
-        return float(np.mean(tree.query(moved, distance_upper_bound=reach)[0] < reach))
+        return np.asarray(tree.query(moved, distance_upper_bound=reach)[0] < reach)
+
+    def overlap(self) -> float:
+        """Give the share of the source that the target has, too."""
+        return float(np.mean(self.in_common(5)))
 
     def is_right(self, pose: Array) -> bool:
         """Tell whether a pose is near the true one."""
@@ -117,10 +121,11 @@ def _simulated(scene: simulate.Scene, sensor: simulate.Lidar, poses: list[Array]
 
 
 def a_part(pair: Pair, seed: int) -> Pair:
-    """Keep of the source a ball about one of its points, with a tenth of them."""
+    """Keep of the source a ball about a point that both have, with a tenth of its points."""
     rng = np.random.default_rng([63, seed])
     points = pair.source.points
-    distances = np.linalg.norm(points - points[rng.integers(len(points))], axis=1)
+    middle = points[rng.choice(np.flatnonzero(pair.in_common(1)))]
+    distances = np.linalg.norm(points - middle, axis=1)
     return replace(pair, source=_some(pair.source, distances <= np.quantile(distances, PART)))
 
 

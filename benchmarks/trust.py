@@ -51,13 +51,14 @@ def _two_places(
 ) -> Pair:
     """Scan from two places: `apart` metres, any yaw for lidars, within `turned` radians for cameras.
 
-    Where a sensor would stand in something, another pair is drawn.
+    Where a sensor would stand in something, another pair is drawn, from farther apart.
     """
     rng = np.random.default_rng([7, seed])
     while True:
         pair = _drawn(scene, sensor, seed, rng, **how)
         if all(np.linalg.norm(cloud.points, axis=1).min() > CLEAR for cloud in (pair.source, pair.target)):
             return pair
+        how["apart"] = 1.2 * how.get("apart", 1.0)
 
 
 def _drawn(
