@@ -37,6 +37,7 @@ __all__ = [
     "different_places",
     "distance_to_nearest",
     "estimated_viewpoint",
+    "examine_poses",
     "extract",
     "field_keypoints",
     "field_signatures",

@@ -141,7 +141,7 @@ fn alternatives(
 fn doubts(found: &ExaminedPose, settings: &RecurrenceSettings) -> Vec<Doubt> {
     let PoseEvidence { overlap, free_space, scale, scale_standard_error: standard_error, .. } =
         found.evidence;
-    let of_kind = |is_kind: fn(&Doubt) -> bool| found.doubts.iter().copied().find(|doubt| is_kind(doubt));
+    let of_kind = |is_kind: fn(&Doubt) -> bool| found.doubts.iter().copied().find(is_kind);
     let mut doubts = Vec::new();
     if overlap < settings.trusted_overlap {
         doubts.push(Doubt::LittleOverlap { overlap });

@@ -18,6 +18,8 @@ use rayon::prelude::*;
 const SAMPLE: usize = 4000;
 /// Of these, one in so many is fitted from all starts.
 const COARSE_STEP: usize = 8;
+/// Points of a scan that are looked at, at most: those at random are as dense, relative to each other, as all.
+const MOST: usize = 500_000;
 /// Points without which nothing is said.
 const LEAST: usize = 200;
 /// Nearest points from which density and normal are taken: their number errs by a fifth, which the fit evens out.
@@ -120,7 +122,8 @@ impl Densities {
         if points.len() < LEAST {
             return None;
         }
-        let tree = KdTree::new(points);
+        let points: Vec<[f64; 3]> = some_of(points.len(), MOST).into_iter().map(|i| points[i]).collect();
+        let tree = KdTree::new(&points);
         let patch = |found: &mut Vec<(f64, u32)>, number: usize| {
             tree.nearest_k(points[number], NEIGHBORS, found);
             patch_of(&found.iter().map(|&(_, index)| points[index as usize].into()).collect::<Vec<_>>())
