@@ -6,7 +6,7 @@
 //! come closer towards its poles, pixels of a camera towards its rims. So the logarithm may change with the direction `u`
 //! as `u^T A u`, the lowest even function of it.
 
-use super::possible_viewpoint::{HIDDEN_IN_ROWS, hidden_share_from};
+use super::possible_viewpoint::may_be_scan_from;
 use crate::kd_tree::KdTree;
 use crate::random::some_of;
 use crate::statistics::median;
@@ -59,14 +59,15 @@ const UNKNOWNS: usize = 9;
 const EVEN: usize = 4;
 
 /// From where a sensor has measured points, which are finite; `None` where their density does not tell, or too many of
-/// them would be hidden from there.
+/// them would be hidden from there, or nothing stands before anything else: many viewpoints fit the density of one smooth
+/// surface.
 ///
 /// ```
 /// use surfsig::estimated_viewpoint;
 /// // The walls of a room, and a pillar, measured from the origin in directions that are evenly spread.
 /// let directions = (0..8000).map(|i| {
 ///     let z = 1.0 - (f64::from(i) + 0.5) / 4000.0;
-///     let (sine, cosine) = (f64::from(i) * 2.399963229728653).sin_cos();
+///     let (sine, cosine) = ((f64::from(i) + 0.5) * 2.399963229728653).sin_cos();
 ///     [(1.0 - z * z).sqrt() * cosine, (1.0 - z * z).sqrt() * sine, z]
 /// });
 /// let points: Vec<[f64; 3]> = directions
@@ -84,9 +85,7 @@ pub fn estimated_viewpoint(points: &[[f64; 3]]) -> Option<[f64; 3]> {
     let densities = Densities::new(points)?;
     let found = densities.viewpoint()?;
     let voxel = densities.size / VOXELS;
-    // Such densities are as good evidence of a scan as rows of points are.
-    let hidden = hidden_share_from(found, &voxel_means(points, voxel), voxel);
-    (hidden < HIDDEN_IN_ROWS).then_some(found)
+    may_be_scan_from(found, &voxel_means(points, voxel), voxel).then_some(found)
 }
 
 /// The surface around a point.
@@ -164,13 +163,18 @@ impl Densities {
         // A stable sort: of equal losses the first start.
         fits.sort_by(|a, b| a.loss.total_cmp(&b.loss));
         fits.truncate(FITTED);
-        let fits: Vec<Fit> = fits.into_par_iter().map(|fit| self.fitted(fit.unknowns, UNKNOWNS, 1)).collect();
-        let best = fits.into_iter().reduce(|best, fit| if fit.loss < best.loss { fit } else { best })?;
-        let left = median(self.patches.iter().map(|patch| error(patch, &best.unknowns).abs()).collect())?;
+        let fits: Vec<[Fit; 2]> =
+            fits.into_par_iter().map(|even| [even, self.fitted(even.unknowns, UNKNOWNS, 1)]).collect();
+        let [even, best] =
+            fits.into_iter().reduce(|best, fit| if fit[1].loss < best[1].loss { fit } else { best })?;
+        let left =
+            |fit: &Fit| median(self.patches.iter().map(|patch| error(patch, &fit.unknowns).abs()).collect());
         let middle = median(self.patches.iter().map(|patch| patch.density).collect())?;
         let before = median(self.patches.iter().map(|patch| (patch.density - middle).abs()).collect())?;
         let viewpoint = best.unknowns.fixed_rows::<3>(0) + self.middle;
-        let tells = best.loss < LARGEST_LOSS && left < UNEXPLAINED * before;
+        // The viewpoint must explain the density alone, too: the sensor's part would fit any smooth change.
+        let is_explained = left(&best)?.max(left(&even)?) < UNEXPLAINED * before;
+        let tells = best.loss < LARGEST_LOSS && is_explained;
         (tells && viewpoint.iter().all(|x| x.is_finite())).then(|| viewpoint.into())
     }
 

@@ -19,7 +19,7 @@ const BROKEN_AROUND: f64 = 0.25;
 /// The same of points to one side: models have 0.33 to 0.6, real scans up to 0.3.
 const BROKEN_BESIDE: f64 = 0.32;
 /// Share of hidden points up to which points in rows are a scan: a floor seen at a grazing angle has 0.3.
-pub(super) const HIDDEN_IN_ROWS: f64 = 0.4;
+const HIDDEN_IN_ROWS: f64 = 0.4;
 /// Radians between neighbouring elevations of one row, at most (float32 changes them by 1e-7).
 const ROW_WIDTH: f64 = 1e-5;
 /// The same in units of the mean distance of elevations: those of points in no rows differ more.
@@ -112,10 +112,11 @@ pub fn measured_from_origin(points: &[[f64; 3]], spacing: f64) -> bool {
     points.len() < DENSE || hidden + rays.step_share() < most
 }
 
-/// Share of points, about `spacing` apart, that others hide from a viewpoint; 1 where that is none.
-pub(super) fn hidden_share_from(viewpoint: [f64; 3], points: &[[f64; 3]], spacing: f64) -> f64 {
-    let rays = Rays::new(viewpoint, points).filter(|rays| !rays.are_far());
-    rays.map_or(1.0, |rays| rays.hidden_share(spacing))
+/// Whether points, about `spacing` apart, whose density is that of a scan from a viewpoint, can have been seen from there:
+/// that is as good evidence as rows of points are, but some must stand before others.
+pub(super) fn may_be_scan_from(viewpoint: [f64; 3], points: &[[f64; 3]], spacing: f64) -> bool {
+    let Some(rays) = Rays::new(viewpoint, points) else { return false };
+    !rays.are_far() && rays.hidden_share(spacing) < HIDDEN_IN_ROWS && rays.step_share() >= STEPS
 }
 
 /// From a viewpoint to points, none of which is there.
