@@ -42,7 +42,8 @@ def estimate_viewpoint(cloud: PointCloud | ArrayLike) -> Array | None:
     -------
     (3,), in the cloud's coordinates and unit: within some hundredths of the scan's size of the true one, or
     in its direction where that is many sizes away. None where the density does not tell, as of scans that
-    were thinned evenly or fused of several, and where not all could be seen from there.
+    were thinned evenly or fused of several, where not all could be seen from there, and where nothing stands
+    before anything else.
 
     Examples
     --------
