@@ -9,10 +9,11 @@
 use super::gicp_cloud::{GicpCloud, GicpTarget};
 use super::observability::{FreeDirection, Motions, UNOBSERVABLE};
 use super::point_to_surface::PointToSurface;
+use super::rivals::RivalSettings;
 use nalgebra::Vector3;
 
 /// Voxels within which the normal of a voxel is that of a point: its own or a neighbouring one.
-pub(crate) const NORMAL_REACH: f64 = 2.0;
+const REACH: f64 = 2.0;
 
 /// From when on a surface holds a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,15 +61,16 @@ impl IndependentNormals {
 
 impl PointToSurface {
     /// Motions that the inliers do not determine, in the target: along some the surface slides over itself, along others,
-    /// over which it slides a share of `weak` of its path at most, only errors of normals would hold it. Normals are
-    /// those of the voxels of source and target, within a reach.
+    /// which are weak, only errors of normals would hold it. Normals are those of the source and the target, of which
+    /// each has one point for a voxel.
     pub fn free_directions(
         &self,
-        [source, target]: [&GicpCloud; 2],
-        reach: f64,
-        weak: f64,
-        limits: HeldLimits,
+        [source, target]: &[GicpCloud; 2],
+        voxel: f64,
+        settings: &RivalSettings,
     ) -> Vec<FreeDirection> {
+        let reach = REACH * voxel;
+        let limits = HeldLimits { share: settings.held_share, deviations: settings.held_deviations };
         let motions = Motions::new(&self.points, &self.normals);
         let to_source = self.T_target_source.inverse();
         let normals_at = |(point, used): (&[f64; 3], &[f64; 3])| {
@@ -81,7 +83,7 @@ impl PointToSurface {
         let both = IndependentNormals::new(inliers.filter_map(normals_at));
         motions.named(|sliding, number| {
             sliding <= UNOBSERVABLE
-                || sliding <= weak && !both.hold(|point| motions.velocity(number, point), limits)
+                || sliding <= settings.weak && !both.hold(|point| motions.velocity(number, point), limits)
         })
     }
 }
@@ -112,7 +114,7 @@ mod tests {
         let settings = PointToSurfaceSettings::default();
         let found = surface.align(&source, RigidTransform::identity(), &settings).expect("it was at the end");
         let clouds = [source, target].map(GicpCloud::new);
-        found.free_directions([&clouds[0], &clouds[1]], 2.0, 0.25, LIMITS)
+        found.free_directions(&clouds, 1.0, &RivalSettings::default())
     }
 
     #[test]

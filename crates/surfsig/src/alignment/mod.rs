@@ -40,7 +40,7 @@ pub use gicp::{GicpResult, GicpSettings, gicp};
 pub use gicp_cloud::GicpCloud;
 pub(crate) use gicp_cloud::{GicpTarget, plane_of};
 pub(crate) use halves::{halves, systematic_covariance};
-pub(crate) use independent_normals::{HeldLimits, IndependentNormals, NORMAL_REACH, PlaceNormals};
+pub(crate) use independent_normals::{HeldLimits, IndependentNormals, PlaceNormals};
 pub(crate) use least_squares::{LinearisedDistances, solve_determined};
 pub use observability::{FreeDirection, free_directions};
 pub(crate) use observability::{Motions, UNOBSERVABLE};

@@ -2,7 +2,6 @@
 
 use super::doubt::Doubt;
 use super::explained::{Closeness, Explained, HIDDEN, explained_share};
-use super::independent_normals::HeldLimits;
 use super::point_to_surface::{PointToSurfaceSettings, TargetSurface};
 use super::scale::Scale;
 use crate::geometry::RigidTransform;
@@ -136,12 +135,6 @@ impl Default for RivalSettings {
             deficit: 0.03,
             deviations: 3.0,
         }
-    }
-}
-
-impl RivalSettings {
-    pub(crate) fn held(&self) -> HeldLimits {
-        HeldLimits { share: self.held_share, deviations: self.held_deviations }
     }
 }
 

@@ -3,8 +3,8 @@
 use super::FindSettings;
 use super::acceptance::Candidate;
 use crate::alignment::{
-    Doubt, FittedTarget, FreeDirection, GicpCloud, NORMAL_REACH, PointToSurface, PointToSurfaceSettings,
-    Rivals, ScaleLimits, TargetSurface, symmetries,
+    Doubt, FittedTarget, FreeDirection, GicpCloud, PointToSurface, PointToSurfaceSettings, Rivals,
+    ScaleLimits, TargetSurface, symmetries,
 };
 use crate::geometry::RigidTransform;
 use crate::random::some_of;
@@ -75,12 +75,7 @@ impl Refined<'_> {
             .filter(is_as_good)
             .collect();
         let clouds = [self.sample.clone(), self.surface.points().to_vec()].map(GicpCloud::new);
-        let free_directions = self.fit.free_directions(
-            [&clouds[0], &clouds[1]],
-            NORMAL_REACH * sought.view.scene.voxel,
-            settings.rivals.weak,
-            settings.rivals.held(),
-        );
+        let free_directions = self.fit.free_directions(&clouds, sought.view.scene.voxel, &settings.rivals);
         let limits = ScaleLimits { doubted: settings.doubted_scale, deviations: settings.scale_deviations };
         let (scale, doubt) = rivals.surface.scale(&moved, &best, limits);
         let mut doubts: Vec<Doubt> = doubt.into_iter().collect();

@@ -5,8 +5,7 @@ use super::pose_search::{self, measured};
 use super::result::PoseEvidence;
 use crate::alignment::{
     Alternative, Closeness, Doubt, Explained, FittedSurface, FittedTarget, FreeDirection, GicpCloud, HIDDEN,
-    NORMAL_REACH, PointToSurfaceSettings, RivalSettings, Rivals, ScaleLimits, TargetSurface, free_directions,
-    without_free_motion,
+    PointToSurfaceSettings, Rivals, ScaleLimits, TargetSurface, free_directions, without_free_motion,
 };
 use crate::depth_image::{DepthImage, Judgement, SurfacePlace};
 use crate::geometry::RigidTransform;
@@ -194,9 +193,7 @@ impl PiecePair<'_> {
         let places = self.source.places(settings.surface_points);
         if let Some(found) = surface.align(&places, *T_target_source, &at_pose) {
             let clouds = [places, surface.points().to_vec()].map(GicpCloud::new);
-            let reach = NORMAL_REACH * surface.voxel();
-            let RivalSettings { weak, .. } = settings.rivals;
-            return found.free_directions([&clouds[0], &clouds[1]], reach, weak, settings.rivals.held());
+            return found.free_directions(&clouds, surface.voxel(), &settings.rivals);
         }
         // Pieces too small for that.
         let rows = self.residuals(T_target_source, settings.surface_points).into_iter();

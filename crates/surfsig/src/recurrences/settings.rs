@@ -107,7 +107,7 @@ pub struct RecurrenceSettings {
     pub doubted_disagreement: f64,
     /// What disagrees then, over what disagrees without, below which the mirror image is the better one.
     pub mirrored_disagreement: f64,
-    /// The logarithm of a scale from which on it is doubted, as in registration.
+    /// The logarithm of a scale from which on it is doubted, as in finding.
     pub doubted_scale: f64,
     /// The same in its standard errors.
     pub scale_deviations: f64,

@@ -3,8 +3,8 @@
 use super::free_space::BothSensors;
 use super::settings::RegistrationSettings;
 use crate::alignment::{
-    Alternative, Doubt, FittedTarget, FreeDirection, GicpCloud, NORMAL_REACH, PointToSurface, RivalSettings,
-    Rivals, ScaleLimits, TargetSurface, symmetries,
+    Alternative, Doubt, FittedTarget, FreeDirection, GicpCloud, PointToSurface, Rivals, ScaleLimits,
+    TargetSurface, symmetries,
 };
 use crate::geometry::RigidTransform;
 use crate::random::some_of;
@@ -102,7 +102,7 @@ impl Judge<'_> {
         let mut judged = Judgement {
             better: alternatives.iter().find(is_better).map(|rival| rival.T_target_source),
             doubts: Vec::new(),
-            free_directions: self.free_directions(found),
+            free_directions: found.free_directions(self.clouds, self.voxel, &settings.rivals),
             alternatives,
             explained: best.share(),
             free_space,
@@ -115,22 +115,8 @@ impl Judge<'_> {
             (judged.scale, judged.scale_standard_error) = (scale.scale, scale.standard_error);
         }
         judged.doubts.extend(doubt);
-        // Where the source's mirror image explains more, faces prove nothing. Where it explains as much, as in corridors
-        // whose ceilings are like their floors, the mirror image is a scan of the same place.
-        let is_of_one_hand = |faces: &Faces<'_>| {
-            !faces.mirrored.iter().any(|&mirrored| self.is_refuted_by_mirror(found, free_space, mirrored))
-        };
-        let support = Support { faces: support.faces.filter(is_of_one_hand), ..support };
         self.doubt(found, support, &mut judged);
         judged
-    }
-
-    /// Motions that the overlap does not determine.
-    fn free_directions(&self, found: &PointToSurface) -> Vec<FreeDirection> {
-        let RivalSettings { weak, .. } = self.settings.rivals;
-        let [source, target] = self.clouds;
-        let reach = NORMAL_REACH * self.voxel;
-        found.free_directions([source, target], reach, weak, self.settings.rivals.held())
     }
 
     /// Whether a transform of the source's mirror image explains more than the one that was found, by more than chance,
@@ -186,9 +172,16 @@ impl Judge<'_> {
         // NaN is no free space that is known.
         let is_freer_than = |share: f64| judged.free_space <= share;
         let explains_much = judged.explained >= settings.certain_explained;
+        // Where the source's mirror image explains more, faces prove nothing. Where it explains as much, as in corridors
+        // whose ceilings are like their floors, the mirror image is a scan of the same place.
+        let is_of_one_hand = |faces: &Faces<'_>| {
+            let mut mirrored = faces.mirrored.iter();
+            !mirrored.any(|&mirrored| self.is_refuted_by_mirror(found, judged.free_space, mirrored))
+        };
         let is_proved_by_faces = support.faces.is_some_and(|faces| {
-            faces.is_exclusive && is_freer_than(settings.free_space.certain_share)
-                || explains_much && is_freer_than(settings.faces.certain_free_space)
+            let explains = faces.is_exclusive && is_freer_than(settings.free_space.certain_share)
+                || explains_much && is_freer_than(settings.faces.certain_free_space);
+            explains && is_of_one_hand(&faces)
         });
         let needed = if is_proved_by_faces {
             0
