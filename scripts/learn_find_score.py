@@ -2,7 +2,7 @@
 
 python scripts/learn_find_score.py --seeds 500 501 502 503 504 505 506 507 508 509 510 511
 
-It prints the array for `crates/surfsig/src/finding/likelihood.rs`, whose terms `terms` repeats, and how many
+It prints the arrays for `crates/surfsig/src/finding/likelihood.rs`, whose terms `terms` and `terms_among_rivals` repeat, and how many
 of the instances are right by the probability that is learnt without their scene. Instances are found with a
 probability that is next to nothing, so that wrong ones are among them, in cluttered scenes
 (`benchmarks/clutter_scene.py`) and in those of half hidden copies (`benchmarks/finding_scene.py`). They are
@@ -39,6 +39,8 @@ RIDGE = 0.002
 SIGNS = (0, 1, -1, -1, -1, 1, 1, 1, -1, -1)
 """Of the coefficients, as few examples tell them badly: 1 of what speaks for a pose, -1 of what speaks
 against it, 0 of both."""
+SIGNS_AMONG_RIVALS = (0, 1, 1, 1)
+"""The same of the coefficients by which rivals count."""
 NOT_SHOWN = 3
 """Objects that are not in the scene and are looked for, too; each counts as many as are not there."""
 OF_COPIES = 3.0
@@ -51,9 +53,10 @@ BINS = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
 
 @dataclass
 class Examples:
-    """Instances: their terms, whether they are right, how much each counts, and the number of their scene."""
+    """Instances: their terms, own and among rivals, whether they are right, how much each counts, and the number of their scene."""
 
     x: Array
+    among_rivals: Array
     right: NDArray[np.bool_]
     weight: Array
     scene: NDArray[np.int64]
@@ -75,8 +78,13 @@ def terms(measures: dict[str, float]) -> list[float]:
     ]
 
 
-def fitted(x: Array, y: Array, weight: Array) -> Array:
-    """Fit a logistic model whose coefficients have the signs of `SIGNS`; x has a constant first column."""
+def terms_among_rivals(measures: dict[str, float]) -> list[float]:
+    """Give what `Measures::among_rivals` computes; without a viewpoint all but the constant are 0."""
+    return [1.0, *(measures[name] for name in ("own_log_odds", "margin_here", "margin_elsewhere"))]
+
+
+def fitted(x: Array, y: Array, weight: Array, signs: tuple[int, ...]) -> Array:
+    """Fit a logistic model whose coefficients have certain signs; x has a constant first column."""
     mean, deviation = x.mean(axis=0), x.std(axis=0)
     mean[0], deviation[0] = 0.0, 1.0
     deviation[deviation == 0.0] = 1.0
@@ -88,7 +96,7 @@ def fitted(x: Array, y: Array, weight: Array) -> Array:
         value = weight @ (np.logaddexp(0.0, odds) - odds * y) + 0.5 * penalty @ w
         return float(value), z.T @ (weight * (1.0 / (1.0 + np.exp(-odds)) - y)) + penalty
 
-    bounds = [(None if sign <= 0 else 0.0, None if sign >= 0 else 0.0) for sign in SIGNS]
+    bounds = [(None if sign <= 0 else 0.0, None if sign >= 0 else 0.0) for sign in signs]
     w = minimize(loss, np.zeros(x.shape[1]), jac=True, method="L-BFGS-B", bounds=bounds).x / deviation
     w[0] -= w @ mean
     return np.asarray(w)
@@ -96,7 +104,7 @@ def fitted(x: Array, y: Array, weight: Array) -> Array:
 
 def examples(seeds: list[int]) -> Examples:
     """Find instances, and tell which are right."""
-    x, right, weight, of = [], [], [], []
+    x, rivals, right, weight, of = [], [], [], [], []
     for seed in track(seeds, transient=True):
         scene = clutter_scene(seed)
         rng = np.random.default_rng(seed)
@@ -106,6 +114,7 @@ def examples(seeds: list[int]) -> Examples:
             true = scene.poses[scene.numbers == number]
             for instance in found.instances:
                 x.append(terms(instance.measures))
+                rivals.append(terms_among_rivals(instance.measures))
                 right.append(
                     any(pose_error(instance.T_scene_model, pose, int(number)) <= RIGHT for pose in true)
                 )
@@ -118,19 +127,20 @@ def examples(seeds: list[int]) -> Examples:
             for instance in found.instances:
                 off = [errors(instance.T_scene_model, pose) for pose in copies.poses]
                 x.append(terms(instance.measures))
+                rivals.append(terms_among_rivals(instance.measures))
                 right.append(any(shift <= SHIFT and turn <= TURN for shift, turn in off))
                 weight.append(OF_COPIES)
                 of.append(seed)
-    return Examples(np.array(x), np.array(right), np.array(weight), np.array(of))
+    return Examples(np.array(x), np.array(rivals), np.array(right), np.array(weight), np.array(of))
 
 
-def left_out(all_of: Examples) -> Array:
+def left_out(all_of: Examples, x: Array, signs: tuple[int, ...]) -> Array:
     """Give each instance's probability by what is learnt from the other scenes."""
     probability = np.empty(len(all_of.right))
     for seed in np.unique(all_of.scene):
         own = all_of.scene == seed
-        w = fitted(all_of.x[~own], all_of.right[~own].astype(np.float64), all_of.weight[~own])
-        probability[own] = 1.0 / (1.0 + np.exp(-all_of.x[own] @ w))
+        w = fitted(x[~own], all_of.right[~own].astype(np.float64), all_of.weight[~own], signs)
+        probability[own] = 1.0 / (1.0 + np.exp(-x[own] @ w))
     return probability
 
 
@@ -144,18 +154,22 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.examples.exists():
         with np.load(arguments.examples) as file:
-            all_of = Examples(file["x"], file["right"], file["weight"], file["scene"])
+            all_of = Examples(**{name: file[name] for name in file.files})
     else:
         all_of = examples(arguments.seeds)
         np.savez(arguments.examples, **vars(all_of))
-    coefficients = fitted(all_of.x, all_of.right.astype(np.float64), all_of.weight)
     print(f"{len(all_of.right)} instances, {all_of.right.sum()} of them right")
-    print(", ".join(f"{value:.2f}" for value in coefficients))
-    probability = left_out(all_of)
-    print("by the probability learnt without their scene:")
-    for low, high in itertools.pairwise(BINS):
-        chosen = (probability >= low) & (probability < high)
-        print(f"  {low:.1f} to {high:.1f}: {all_of.right[chosen].sum()} of {chosen.sum()} right")
+    for name, x, signs in (
+        ("by their own evidence", all_of.x, SIGNS),
+        ("among rivals", all_of.among_rivals, SIGNS_AMONG_RIVALS),
+    ):
+        coefficients = fitted(x, all_of.right.astype(np.float64), all_of.weight, signs)
+        print(f"{name}: {', '.join(f'{value:.2f}' for value in coefficients)}")
+        probability = left_out(all_of, x, signs)
+        print("by the probability learnt without their scene:")
+        for low, high in itertools.pairwise(BINS):
+            chosen = (probability >= low) & (probability < high)
+            print(f"  {low:.1f} to {high:.1f}: {all_of.right[chosen].sum()} of {chosen.sum()} right")
 
 
 if __name__ == "__main__":

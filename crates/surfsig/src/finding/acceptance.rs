@@ -3,6 +3,7 @@
 use super::evidence::{Evidence, ModelView};
 use super::examination::{Examined, Refined};
 use super::model::Model;
+use super::rival_candidates::RivalOdds;
 use super::scene::{Scene, SceneSurface};
 use super::{FindSettings, Instance, log_odds};
 use crate::alignment::{FreeDirection, TargetSurface, even_sample, infinite_along};
@@ -11,7 +12,7 @@ use crate::kd_tree::KdTree;
 use crate::{Error, Monitor};
 use nalgebra::{Matrix6, Vector3};
 use rayon::prelude::*;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// By how much the logarithm of the odds may grow when a transform is fitted to the scene's own points: those that are
 /// lower by as much are not given up before.
@@ -25,11 +26,29 @@ pub(super) struct Sought<'a> {
     pub view: ModelView<'a>,
     tree: KdTree,
     extent: f64,
+    /// See [`Sought::surface`].
+    surface: OnceLock<TargetSurface>,
 }
 
 impl<'a> Sought<'a> {
     pub fn new(number: usize, model: Model, view: ModelView<'a>) -> Self {
-        Self { number, tree: KdTree::new(&model.samples), extent: model.extent(), model, view }
+        let (tree, extent) = (KdTree::new(&model.samples), model.extent());
+        Self { number, tree, extent, model, view, surface: OnceLock::new() }
+    }
+
+    /// All of the model's points as the surface that the scene's points are fitted to, made when it is first asked for.
+    pub fn surface(&self) -> &TargetSurface {
+        self.surface.get_or_init(|| TargetSurface::new(self.model.points.clone(), self.view.scene.voxel))
+    }
+
+    /// Largest distance of the model's samples from its centre.
+    pub fn extent(&self) -> f64 {
+        self.extent
+    }
+
+    /// Whether a point, in the model's axes, is at its surface.
+    pub fn is_on(&self, point: [f64; 3], reach: f64) -> bool {
+        self.tree.nearest(point, reach).is_some()
     }
 }
 
@@ -40,6 +59,7 @@ pub(super) struct Candidate<'a> {
     pub sought: Arc<Sought<'a>>,
     pub T_scene_model: RigidTransform,
     pub evidence: Evidence,
+    pub rivals: RivalOdds,
     /// Whether it was fitted to the scene's own points.
     pub is_fitted: bool,
 }
@@ -49,8 +69,7 @@ impl Candidate<'_> {
     fn is_near(&self, inverse: &RigidTransform, point: [f64; 3], reach: f64) -> bool {
         let limit = self.sought.extent + reach;
         let gap = Vector3::from(point) - self.T_scene_model.translation;
-        gap.norm_squared() < limit * limit
-            && self.sought.tree.nearest(inverse.transform_point(point), reach).is_some()
+        gap.norm_squared() < limit * limit && self.sought.is_on(inverse.transform_point(point), reach)
     }
 
     /// Which points of the scene are at the model's surface, by their numbers.
@@ -67,6 +86,15 @@ impl Candidate<'_> {
 
     pub fn judged(&self, is_free: &[bool]) -> Evidence {
         self.sought.view.judged(&[self.T_scene_model], is_free)[0]
+    }
+
+    /// Evidence with what rivals say, too, where free space is known: elsewhere little tells right from wrong ones.
+    fn among_rivals(&self, own: Evidence) -> Evidence {
+        if self.sought.view.viewpoint.is_none() {
+            return own;
+        }
+        let (measures, log_odds) = own.measures.among_rivals(own.log_odds, self.rivals);
+        Evidence { measures, log_odds, ..own }
     }
 }
 
@@ -133,13 +161,17 @@ pub(super) fn accepted(
         let Some(refined) = refined(&candidate, scene, &is_taken, settings) else { continue };
         let fitted = &refined.candidate;
         let evidence = fitted.judged(unexplained.of(fitted));
-        if evidence.log_odds < least {
+        if evidence.log_odds < least_before_fit(settings) {
             continue;
         }
         if !candidate.is_fitted && candidates.iter().any(|other| other.evidence.log_odds > evidence.log_odds)
         {
             // Fitted it is worse than it seemed: another one may be better.
             candidates.push(Candidate { evidence, ..refined.candidate });
+            continue;
+        }
+        let evidence = fitted.among_rivals(evidence);
+        if evidence.log_odds < least {
             continue;
         }
         let examined = refined.examined(evidence.support, unexplained.of(fitted), settings);
@@ -175,12 +207,15 @@ fn refined<'a>(
     let near: Vec<[f64; 3]> =
         near.into_iter().filter(|&number| !is_taken[number]).map(|number| points[number]).collect();
     let sample = even_sample(&near, settings.max_fitted, voxel);
-    let surface = TargetSurface::new(candidate.sought.model.points.clone(), voxel);
     // The model's surface is the target: it is whole, and denser than what is seen.
-    let fit = surface.align(&sample, candidate.T_scene_model.inverse(), &settings.point_to_surface)?;
+    let fit = candidate.sought.surface().align(
+        &sample,
+        candidate.T_scene_model.inverse(),
+        &settings.point_to_surface,
+    )?;
     let fitted =
         Candidate { T_scene_model: fit.T_target_source.inverse(), is_fitted: true, ..candidate.clone() };
-    Some(Refined { candidate: fitted, fit, surface, sample })
+    Some(Refined { candidate: fitted, fit, sample })
 }
 
 fn instance(

@@ -52,7 +52,7 @@ pub(super) struct ModelView<'a> {
     to_motions: Option<Matrix6<f64>>,
     /// Whether the model goes all around.
     is_closed: bool,
-    viewpoint: Option<[f64; 3]>,
+    pub viewpoint: Option<[f64; 3]>,
     /// From the model's middle, what is looked at.
     pub reach: f64,
     rim: Rim,
@@ -269,6 +269,7 @@ impl<'a> ModelView<'a> {
             going_on: self.rim.going_on(transform, &is_touching, &self.scene, is_free),
             roundness: normal_spread(on().map(|sample| &self.samples[sample].normal)),
             resolution: self.reach / self.scene.voxel,
+            ..Measures::default()
         };
         let log_odds = if seen.is_some() {
             if self.front.is_empty() { measures.log_odds_of_samples() } else { measures.log_odds() }

@@ -4,7 +4,7 @@ use super::FindSettings;
 use super::acceptance::Candidate;
 use crate::alignment::{
     Doubt, FittedTarget, FreeDirection, GicpCloud, PointToSurface, PointToSurfaceSettings, Rivals,
-    ScaleLimits, TargetSurface, symmetries,
+    ScaleLimits, symmetries,
 };
 use crate::geometry::RigidTransform;
 use crate::random::some_of;
@@ -14,8 +14,6 @@ pub(super) struct Refined<'a> {
     pub candidate: Candidate<'a>,
     /// The scene's points on the model: the target is the model.
     pub fit: PointToSurface,
-    /// The model's.
-    pub surface: TargetSurface,
     /// The scene's points that were fitted.
     pub sample: Vec<[f64; 3]>,
 }
@@ -39,18 +37,14 @@ impl Refined<'_> {
         let numbers = some_of(self.sample.len(), settings.rivals.points);
         let some: Vec<[f64; 3]> = numbers.into_iter().map(|i| self.sample[i]).collect();
         let sought = &self.candidate.sought;
+        let surface = sought.surface();
         let radius = sought.model.places.radius;
         let fit = PointToSurfaceSettings {
             max_distance: settings.rival_distance * radius / sought.view.scene.voxel,
             ..settings.point_to_surface
         };
         let rivals = Rivals {
-            surface: FittedTarget {
-                surface: &self.surface,
-                farthest: self.fit.farthest,
-                fit,
-                is_hidden: &|_| false,
-            },
+            surface: FittedTarget { surface, farthest: self.fit.farthest, fit, is_hidden: &|_| false },
             source: &some,
             T_target_source: self.fit.T_target_source,
             radius,
@@ -58,11 +52,10 @@ impl Refined<'_> {
         };
         let best = rivals.explained();
         let moved = self.fit.T_target_source.transform_points(&some);
-        let proposed: Vec<RigidTransform> =
-            symmetries(self.surface.points(), &self.fit.normals, &moved, radius)
-                .into_iter()
-                .map(|symmetry| symmetry * self.fit.T_target_source)
-                .collect();
+        let proposed: Vec<RigidTransform> = symmetries(surface.points(), &self.fit.normals, &moved, radius)
+            .into_iter()
+            .map(|symmetry| symmetry * self.fit.T_target_source)
+            .collect();
         // What the sensor saw through or did not see refutes a rival, too.
         let is_as_good = |transform: &RigidTransform| {
             let rival = Candidate { T_scene_model: *transform, ..self.candidate.clone() };
@@ -74,7 +67,7 @@ impl Refined<'_> {
             .map(|(transform, _)| transform.inverse())
             .filter(is_as_good)
             .collect();
-        let clouds = [self.sample.clone(), self.surface.points().to_vec()].map(GicpCloud::new);
+        let clouds = [self.sample.clone(), surface.points().to_vec()].map(GicpCloud::new);
         let free_directions = self.fit.free_directions(&clouds, sought.view.scene.voxel, &settings.rivals);
         let limits = ScaleLimits { doubted: settings.doubted_scale, deviations: settings.scale_deviations };
         let (scale, doubt) = rivals.surface.scale(&moved, &best, limits);

@@ -4,6 +4,7 @@
 //! learnt on simulated scenes alone; `scripts/learn_find_score.py` learns them from instances.
 
 use super::FindSettings;
+use super::rival_candidates::RivalOdds;
 
 /// What is measured of a transform of a model in a scene. Shares of a model's samples are over the most of the model that
 /// can be seen at once.
@@ -56,6 +57,13 @@ pub struct Measures {
     /// How well what lies on the scene determines the transform: of all small motions the least mean square by which one
     /// changes the distances there, over the mean square by which it moves the model; 0 where a motion changes none.
     pub constraint: f64,
+    /// Logarithm of the odds that the transform is right, by all of the above.
+    pub own_log_odds: f64,
+    /// By how much it is above that of the best other transform that explains
+    /// the same part of the scene, symmetries of the model left out.
+    pub margin_here: f64,
+    /// The same of the fifth best transform elsewhere.
+    pub margin_elsewhere: f64,
 }
 
 /// Terms of the logistic model of all measures, the first of which is constant.
@@ -71,6 +79,13 @@ const TERMS_OF_SAMPLES: usize = 8;
 /// right. They choose which transforms are judged by all measures.
 const COEFFICIENTS_OF_SAMPLES: [f64; TERMS_OF_SAMPLES] =
     [-2.87, 2.04, 1.86, -32.29, -8.12, 1.17, -25.52, 4.4];
+/// Constant, and coefficients of the logarithm of the odds by a transform's own evidence, of `margin_here` and of
+/// `margin_elsewhere`, from 307 instances in 15 cluttered scenes and 30 of half hidden copies, of which 162 are right. Left
+/// out scene by scene, 113 of 118 with a probability above 0.9 were right, 28 of 32 from 0.7 on; of the 70 right ones in
+/// clutter 50 were found at a precision of 0.95, without rivals 23 (`scripts/learn_find_score.py`).
+const COEFFICIENTS_AMONG_RIVALS: [f64; 4] = [-2.84, 1.20, 0.50, 0.07];
+/// A margin beyond which more says no more.
+const LARGE_MARGIN: f64 = 8.0;
 /// Spread of normals from which on they are more than a plane: it counts no more.
 const ROUND: f64 = 0.1;
 /// What is added to a constraint before its logarithm is taken: less is next to none.
@@ -89,7 +104,7 @@ impl Measures {
     /// let measures = surfsig::Measures { support: 0.5, ..Default::default() };
     /// assert_eq!(measures.named()[0], ("support", 0.5));
     /// ```
-    pub fn named(&self) -> [(&'static str, f64); 20] {
+    pub fn named(&self) -> [(&'static str, f64); 23] {
         [
             ("support", self.support),
             ("confirmed", self.confirmed),
@@ -111,6 +126,9 @@ impl Measures {
             ("outline_goes_on", self.outline_goes_on),
             ("uncovered", self.uncovered),
             ("constraint", self.constraint),
+            ("own_log_odds", self.own_log_odds),
+            ("margin_here", self.margin_here),
+            ("margin_elsewhere", self.margin_elsewhere),
         ]
     }
 
@@ -149,6 +167,16 @@ impl Measures {
     /// Logarithm of the odds that the transform is right, where it is known from where the scene was seen.
     pub(super) fn log_odds(&self) -> f64 {
         sum_of_products(&self.terms(), &COEFFICIENTS)
+    }
+
+    /// The same measures with the margins over rivals, whose logarithms of the odds are given, and the logarithm of the odds
+    /// that the transform is right by both; `own` is that by its own evidence.
+    pub(super) fn among_rivals(&self, own: f64, rivals: RivalOdds) -> (Self, f64) {
+        let margin = |rival: f64| (own - rival).clamp(-LARGE_MARGIN, LARGE_MARGIN);
+        let [margin_here, margin_elsewhere] = [rivals.here, rivals.elsewhere].map(margin);
+        let terms = [1.0, own, margin_here, margin_elsewhere];
+        let log_odds = sum_of_products(&terms, &COEFFICIENTS_AMONG_RIVALS);
+        (Self { own_log_odds: own, margin_here, margin_elsewhere, ..*self }, log_odds)
     }
 
     /// The same without the front and the outline, of which few samples give no picture.

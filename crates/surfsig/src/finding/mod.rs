@@ -13,6 +13,7 @@ mod model;
 mod proposals;
 mod result;
 mod rim;
+mod rival_candidates;
 mod samples;
 mod scene;
 mod settings;
@@ -29,6 +30,7 @@ use acceptance::{Candidate, Sought, accepted, least_before_fit};
 use evidence::ModelView;
 use model::{MIN_POINTS, SPACINGS_PER_RADIUS};
 use proposals::{different, proposed_transforms, raw_transforms};
+use rival_candidates::RivalOdds;
 use scene::Scene;
 use std::sync::Arc;
 
@@ -148,11 +150,14 @@ fn candidates_of<'a>(
         let judged = last.judged(&aligned, &vec![true; fine.samples().len()]);
         let sought = Arc::new(Sought::new(number, side, last));
         let least = least_before_fit(settings);
-        let good = aligned.into_iter().zip(judged).filter(|(_, found)| found.log_odds >= least);
-        candidates.extend(good.map(|(transform, evidence)| Candidate {
+        let rivals = RivalOdds::of_each(&sought, &aligned, &judged);
+        let all = aligned.into_iter().zip(judged).zip(rivals);
+        let good = all.filter(|((_, found), _)| found.log_odds >= least);
+        candidates.extend(good.map(|((transform, evidence), rivals)| Candidate {
             sought: Arc::clone(&sought),
             T_scene_model: transform,
             evidence,
+            rivals,
             is_fitted: false,
         }));
     }

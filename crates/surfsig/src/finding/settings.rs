@@ -42,7 +42,7 @@ pub struct FindSettings {
     pub coarse_distances: (f64, f64, usize),
     /// Voxels of both judgements, in those of the last.
     pub coarse_voxels: f64,
-    /// Transforms that are aligned and judged by most points.
+    /// Transforms that are aligned and judged by most points: right ones were among the first 9 wherever they were among 60.
     pub tried: usize,
     /// Points of the model in their alignment.
     pub aligned_points: usize,
@@ -116,7 +116,7 @@ impl Default for FindSettings {
             coarse_points: 300,
             coarse_distances: (2.5, 1.5, 4),
             coarse_voxels: 2.0,
-            tried: 60,
+            tried: 20,
             aligned_points: 1000,
             fine_distances: (2.5, 1.5, 5),
             fine_points: 3000,

@@ -1,0 +1,120 @@
+//! What other transforms of the same model reach in a scene: a right one stands out among them.
+//!
+//! Where much of a scene is like the model, as smooth clutter is like a smooth object, many transforms reach nearly as much
+//! as the best, and that says less. Where the best is right, the others are far behind.
+
+use super::acceptance::Sought;
+use super::evidence::Evidence;
+use crate::alignment::transformed;
+use crate::geometry::RigidTransform;
+use crate::random::some_of;
+use rayon::prelude::*;
+
+/// Samples of the model by which transforms are compared.
+const COMPARED: usize = 300;
+/// Mean distance between the samples under two transforms, in extents of the model, up to which they are one: what is
+/// taken as right is a tenth of the diameter off at most.
+const SAME: f64 = 0.2;
+/// Share of the samples on the scene under one transform that must lie on the model under another one for both to explain
+/// the same part of the scene.
+const SAME_PART: f64 = 0.5;
+/// Share of the samples that lie on the model itself under another transform if that is a symmetry of the model.
+const SYMMETRIC: f64 = 0.9;
+/// Distance from the model up to which they do, in its extents.
+const ON_ITSELF: f64 = 0.1;
+/// Which of the transforms elsewhere counts, by their odds: so many less one copies of the model may be in the scene beside
+/// the one that is judged.
+const ELSEWHERE: usize = 5;
+/// Logarithm of the odds below which a rival says nothing: it is also that of none.
+const NO_RIVAL: f64 = -12.0;
+
+/// Logarithms of the odds that rivals of a transform have by their own evidence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RivalOdds {
+    /// Of the best other transform that explains the same part of the scene, but for symmetries of the model.
+    pub here: f64,
+    /// Of the fifth best that explains other parts: the model may be there more than once.
+    pub elsewhere: f64,
+}
+
+impl RivalOdds {
+    /// Those of each of some transforms (T_scene_model) of a model.
+    pub fn of_each(sought: &Sought<'_>, transforms: &[RigidTransform], evidence: &[Evidence]) -> Vec<Self> {
+        let compared = Compared::new(sought, transforms);
+        let of = |one: usize| {
+            let (mut here, mut elsewhere) = (NO_RIVAL, Vec::new());
+            for other in (0..transforms.len()).filter(|&other| !compared.are_one(one, other)) {
+                let odds = evidence[other].log_odds.max(NO_RIVAL);
+                if !compared.explain_the_same(one, other) {
+                    elsewhere.push(odds);
+                } else if odds > here && !compared.is_symmetry(one, other) {
+                    here = odds;
+                }
+            }
+            elsewhere.sort_by(|a, b| b.total_cmp(a));
+            Self { here, elsewhere: elsewhere.get(ELSEWHERE - 1).copied().unwrap_or(NO_RIVAL) }
+        };
+        (0..transforms.len()).into_par_iter().map(of).collect()
+    }
+}
+
+/// Transforms of a model with some of its samples under them.
+struct Compared<'a> {
+    sought: &'a Sought<'a>,
+    transforms: &'a [RigidTransform],
+    samples: Vec<[f64; 3]>,
+    /// The numbers of those that lie on the scene under each transform.
+    on_scene: Vec<Vec<usize>>,
+}
+
+impl<'a> Compared<'a> {
+    fn new(sought: &'a Sought<'a>, transforms: &'a [RigidTransform]) -> Self {
+        let view = &sought.view;
+        let chosen = some_of(view.samples.len(), COMPARED);
+        let touching = |transform: &RigidTransform| {
+            let is_near = |&number: &usize| {
+                let moved = transformed(transform, &view.samples[chosen[number]]);
+                view.scene.surface.nearest(&moved, view.scene.voxel).is_some()
+            };
+            (0..chosen.len()).filter(is_near).collect()
+        };
+        Self {
+            on_scene: transforms.par_iter().map(touching).collect(),
+            samples: chosen.iter().map(|&number| view.samples[number].place.map(f64::from)).collect(),
+            sought,
+            transforms,
+        }
+    }
+
+    /// Whether two transforms move the model to about the same place.
+    fn are_one(&self, one: usize, other: usize) -> bool {
+        let [one, other] = [one, other].map(|number| &self.transforms[number]);
+        let turn = one.rotation - other.rotation;
+        let shift = one.translation - other.translation;
+        let distance = |sample: &[f64; 3]| (turn * nalgebra::Vector3::from(*sample) + shift).norm();
+        let sum: f64 = self.samples.iter().map(distance).sum();
+        sum <= SAME * self.sought.extent() * self.samples.len() as f64
+    }
+
+    /// Share of some samples that lie on the model, within a distance, when one transform has moved them and the other one
+    /// the model.
+    fn share_on(&self, numbers: impl Iterator<Item = usize>, one: usize, other: usize, distance: f64) -> f64 {
+        let between = self.transforms[other].inverse() * self.transforms[one];
+        let (mut on, mut all) = (0_usize, 0_usize);
+        for number in numbers {
+            all += 1;
+            on += usize::from(self.sought.is_on(between.transform_point(self.samples[number]), distance));
+        }
+        on as f64 / all.max(1) as f64
+    }
+
+    fn explain_the_same(&self, one: usize, other: usize) -> bool {
+        let on_scene = self.on_scene[one].iter().copied();
+        self.share_on(on_scene, one, other, self.sought.view.scene.voxel) >= SAME_PART
+    }
+
+    fn is_symmetry(&self, one: usize, other: usize) -> bool {
+        let all = 0..self.samples.len();
+        self.share_on(all, one, other, ON_ITSELF * self.sought.extent()) >= SYMMETRIC
+    }
+}
