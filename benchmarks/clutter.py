@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import tempfile
 import time
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
-from clutter_scene import LIBRARY, ClutterScene, clutter_scene, diameter, model
+from clutter_scene import LIBRARY, ClutterScene, clutter_scene, diameter, model, model_normals
 from numpy.typing import NDArray
+from peers import peer_python, run_json
 from rich.progress import track
 from scipy.spatial import cKDTree
 
@@ -20,6 +23,9 @@ import surfsig
 
 Array = NDArray[np.float64]
 
+HERE = Path(__file__).resolve().parent
+PEER_SECONDS = 3600
+"""After which a peer is given up, for the objects of one scene."""
 RIGHT = 0.1
 """Error of a right pose, at most, in diameters."""
 SYMMETRIC = 0.98
@@ -87,11 +93,37 @@ class Tally:
         return "\n".join(lines)
 
 
+def by_peer(method: str, scene: ClutterScene) -> tuple[int, list[float]]:
+    """Let a peer look for each object that shows enough; count right poses, and give processor seconds."""
+    shown = [k for k in range(len(scene.numbers)) if scene.visible[k] >= LEAST_VISIBLE]
+    numbers = [int(scene.numbers[k]) for k in shown]
+    points = scene.cloud.points[scene.cloud.finite]
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "scene.npz"
+        np.savez(
+            file,
+            scene=points,
+            models=np.array([model(number).points for number in numbers]),
+            normals=np.array([model_normals(number) for number in numbers]),
+            diameters=[diameter(number) for number in numbers],
+        )
+        program: list[str | Path] = [peer_python(), HERE / "clutter_peers.py", method, file]
+        answer = run_json(program, threads=1, seconds=PEER_SECONDS)
+    errors = [
+        pose_error(np.array(pose), scene.poses[k], number)
+        for pose, k, number in zip(answer["poses"], shown, numbers, strict=True)
+    ]
+    return sum(error <= RIGHT for error in errors), answer["processor"]
+
+
 def main() -> None:
     """Look for each object alone, and for all of the library at once."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs="+", default=list(range(300, 306)))
     parser.add_argument("--alone", action="store_true", help="look for each of the shown objects alone, too")
+    parser.add_argument(
+        "--peers", action="store_true", help="let OpenCV and Open3D look for each of them, too"
+    )
     arguments = parser.parse_args()
     names = {f"object {number}": number for number in range(LIBRARY)}
     together, alone = Tally(), Tally()
@@ -118,6 +150,14 @@ def main() -> None:
     print(
         together.report(f"{LIBRARY} models at once, prepared in the same call, {len(arguments.seeds)} scenes")
     )
+    if arguments.peers:
+        for method in ("opencv", "open3d"):
+            told = [by_peer(method, clutter_scene(seed)) for seed in arguments.seeds]
+            seconds = [second for _, each in told for second in each]
+            print(
+                f"{method}: the best pose is right {sum(right for right, _ in told)} of {len(seconds)}, "
+                f"processor seconds {np.median(seconds):.1f} (median), {max(seconds):.1f} (most)"
+            )
     if arguments.alone:
         print(alone.report("each shown object alone"))
 

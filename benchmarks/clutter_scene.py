@@ -89,20 +89,32 @@ def _scaled(surface: simulate.Surface, scale: float) -> simulate.Surface:
 
 def _surface_points(parts: Parts | tuple[tuple[simulate.Surface, Array], ...], count: int) -> Array:
     """Give points of the outer surface: what rays from all around meet first."""
+    return _surface(parts, count)[0]
+
+
+def _surface(parts: Parts | tuple[tuple[simulate.Surface, Array], ...], count: int) -> tuple[Array, Array]:
+    """Give them with their outward unit normals."""
     rng = np.random.default_rng(0)
     scene = simulate.Scene([simulate.Placed(surface, own) for surface, own in parts])
     reach = max(surface.extent + float(np.linalg.norm(own[:3, 3])) for surface, own in parts)
     rays = rng.normal(size=(6 * count, 3))
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     aims = rng.uniform(-0.5 * reach, 0.5 * reach, rays.shape)
-    hits = scene.cast(aims - 3.0 * reach * rays, rays).points
-    return np.asarray(hits[np.isfinite(hits[:, 0])][:count])
+    hits = scene.cast(aims - 3.0 * reach * rays, rays)
+    known = np.flatnonzero(np.isfinite(hits.points[:, 0]))[:count]
+    return np.asarray(hits.points[known]), np.asarray(hits.normals[known])
 
 
 @cache
 def model(number: int, points: int = 20_000) -> surfsig.PointCloud:
     """Give an object's whole outer surface, without normals."""
     return surfsig.PointCloud(_surface_points(object_parts(number), points))
+
+
+@cache
+def model_normals(number: int, points: int = 20_000) -> Array:
+    """Give the outward normals of its points, for those who need them."""
+    return _surface(object_parts(number), points)[1]
 
 
 @cache

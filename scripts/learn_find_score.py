@@ -2,8 +2,8 @@
 
 python scripts/learn_find_score.py --seeds 500 501 502 503 504 505 506 507 508 509 510 511
 
-It prints the arrays for `crates/surfsig/src/finding/likelihood.rs`, whose terms `terms` and `terms_among_rivals` repeat, and how many
-of the instances are right by the probability that is learnt without their scene. Instances are found with a
+It prints the arrays for `crates/surfsig/src/finding/likelihood.rs`, whose terms `terms` and
+`terms_among_rivals` repeat, and how many of the instances are right by the probability that is learnt without their scene. Instances are found with a
 probability that is next to nothing, so that wrong ones are among them, in cluttered scenes
 (`benchmarks/clutter_scene.py`) and in those of half hidden copies (`benchmarks/finding_scene.py`). They are
 kept in a file, so that the fit can be repeated.
@@ -53,7 +53,7 @@ BINS = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
 
 @dataclass
 class Examples:
-    """Instances: their terms, own and among rivals, whether they are right, how much each counts, and the number of their scene."""
+    """Instances: their terms, own and among rivals, whether they are right, weights, and their scenes."""
 
     x: Array
     among_rivals: Array
