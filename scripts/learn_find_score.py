@@ -3,10 +3,10 @@
 python scripts/learn_find_score.py --seeds 500 501 502 503 504 505 506 507 508 509 510 511
 
 It prints the arrays for `crates/surfsig/src/finding/likelihood.rs`, whose terms `terms` and
-`terms_among_rivals` repeat, and how many of the instances are right by the probability that is learnt without their scene. Instances are found with a
-probability that is next to nothing, so that wrong ones are among them, in cluttered scenes
-(`benchmarks/clutter_scene.py`) and in those of half hidden copies (`benchmarks/finding_scene.py`). They are
-kept in a file, so that the fit can be repeated.
+`terms_among_rivals` repeat, and how many of the instances are right by the probability that is learnt
+without their scene. Instances are found with a probability that is next to nothing, so that wrong ones are
+among them, in cluttered scenes (`benchmarks/clutter_scene.py`) and in those of half hidden copies
+(`benchmarks/finding_scene.py`). They are kept in a file, so that the fit can be repeated.
 """
 
 from __future__ import annotations
