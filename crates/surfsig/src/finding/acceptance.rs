@@ -6,7 +6,7 @@ use super::model::Model;
 use super::rival_candidates::RivalOdds;
 use super::scene::{Scene, SceneSurface};
 use super::{FindSettings, Instance, log_odds};
-use crate::alignment::{FreeDirection, TargetSurface, even_sample, infinite_along};
+use crate::alignment::{FreeDirection, PointToSurfaceSettings, TargetSurface, even_sample, infinite_along};
 use crate::geometry::RigidTransform;
 use crate::kd_tree::KdTree;
 use crate::{Error, Monitor};
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};
 
 /// By how much the logarithm of the odds may grow when a transform is fitted to the scene's own points: those that are
-/// lower by as much are not given up before.
+/// lower by as much are not given up before. A fit by which they fall more has left the place that was judged.
 const GAIN_OF_FIT: f64 = 2.0;
 
 /// A model that is looked for, with one of its sides out.
@@ -158,9 +158,11 @@ pub(super) fn accepted(
         });
         let Some(best) = best else { break };
         let candidate = candidates.remove(best);
-        let Some(refined) = refined(&candidate, scene, &is_taken, settings) else { continue };
+        let is_free = unexplained.of(&candidate);
+        let Some((refined, evidence)) = refined(&candidate, scene, &is_taken, is_free, settings) else {
+            continue;
+        };
         let fitted = &refined.candidate;
-        let evidence = fitted.judged(unexplained.of(fitted));
         if evidence.log_odds < least_before_fit(settings) {
             continue;
         }
@@ -194,28 +196,36 @@ pub(super) fn accepted(
     Ok(instances)
 }
 
-/// The candidate fitted to the scene's own points, which no other instance has taken; `None` where hardly any is near.
+/// The candidate fitted to the scene's own points, which no other instance has taken, and its evidence by the samples that
+/// are free; `None` where hardly any point is near.
 fn refined<'a>(
     candidate: &Candidate<'a>,
     scene: &Scene<'_>,
     is_taken: &[bool],
+    is_free: &[bool],
     settings: &FindSettings,
-) -> Option<Refined<'a>> {
+) -> Option<(Refined<'a>, Evidence)> {
     let voxel = candidate.sought.view.scene.voxel;
     let points = &scene.scan.points;
     let near = candidate.near(points.par_iter().copied(), settings.own_distance);
     let near: Vec<[f64; 3]> =
         near.into_iter().filter(|&number| !is_taken[number]).map(|number| points[number]).collect();
     let sample = even_sample(&near, settings.max_fitted, voxel);
-    // The model's surface is the target: it is whole, and denser than what is seen.
-    let fit = candidate.sought.surface().align(
-        &sample,
-        candidate.T_scene_model.inverse(),
-        &settings.point_to_surface,
-    )?;
-    let fitted =
-        Candidate { T_scene_model: fit.T_target_source.inverse(), is_fitted: true, ..candidate.clone() };
-    Some(Refined { candidate: fitted, fit, sample })
+    let by = |settings: &PointToSurfaceSettings| {
+        // The model's surface is the target: it is whole, and denser than what is seen.
+        let fit = candidate.sought.surface().align(&sample, candidate.T_scene_model.inverse(), settings)?;
+        let fitted =
+            Candidate { T_scene_model: fit.T_target_source.inverse(), is_fitted: true, ..candidate.clone() };
+        Some(Refined { candidate: fitted, fit, sample: sample.clone() })
+    };
+    let refined = by(&settings.point_to_surface)?;
+    let evidence = refined.candidate.judged(is_free);
+    if evidence.log_odds >= candidate.evidence.log_odds - GAIN_OF_FIT {
+        return Some((refined, evidence));
+    }
+    // Where the points hardly determine a motion, the fit has followed their noise and left the place that was judged.
+    let there = PointToSurfaceSettings { max_iterations: 0, ..settings.point_to_surface };
+    Some((by(&there)?, candidate.evidence))
 }
 
 fn instance(

@@ -7,7 +7,7 @@ use crate::alignment::OrientedSurface;
 use crate::depth_image::{DepthImage, SurfacePlace};
 use crate::scan::CenteredScan;
 use crate::spacing::point_spacing;
-use crate::visibility::{all_seen_from, estimated_viewpoint};
+use crate::visibility::{all_seen_from, estimated_viewpoint, measured_from_origin};
 use crate::voxels::Voxels;
 use crate::{Error, FieldPlaces, Monitor};
 use nalgebra::Vector3;
@@ -76,7 +76,13 @@ impl<'a> Scene<'a> {
         let spacing = point_spacing(&scan.points);
         let is_unknown = !scan.scan().is_oriented();
         let viewpoint = scan.viewpoint.unwrap_or_else(|| scan.center.map(|x| -x));
-        let viewpoint = all_seen_from(viewpoint, &scan.points, spacing).then_some(viewpoint);
+        // Noise and mixed pixels hide more of a depth image than of what is known to be no scan only by that.
+        let from_there = || -> Vec<[f64; 3]> {
+            scan.points.iter().map(|point| [0, 1, 2].map(|k| point[k] - viewpoint[k])).collect()
+        };
+        let is_seen =
+            all_seen_from(viewpoint, &scan.points, spacing) || measured_from_origin(&from_there(), spacing);
+        let viewpoint = is_seen.then_some(viewpoint);
         let viewpoint = viewpoint.or_else(|| is_unknown.then(|| estimated_viewpoint(&scan.points)).flatten());
         let scan = CenteredScan { viewpoint: viewpoint.filter(|_| scan.directions.is_none()), ..scan };
         let is_oriented = scan.scan().is_oriented();
