@@ -1,6 +1,7 @@
 //! Points with the normals of the surface around each, as generalised ICP aligns them.
 
 use crate::kd_tree::KdTree;
+use crate::random::some_of;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
@@ -47,6 +48,15 @@ impl GicpCloud {
         let all = self.points.par_iter().zip(&self.normals).with_min_len(PART);
         let (points, normals): (Vec<[f64; 3]>, Vec<[f64; 3]>) =
             all.filter(|(point, _)| is_wanted(**point)).map(|(point, normal)| (*point, *normal)).unzip();
+        let tree = KdTree::new(&points);
+        Self { points, normals, tree }
+    }
+
+    /// At most `count` of the points, with the normals that they have among all.
+    pub(crate) fn sample(&self, count: usize) -> Self {
+        let numbers = some_of(self.len(), count);
+        let (points, normals): (Vec<[f64; 3]>, Vec<[f64; 3]>) =
+            numbers.into_iter().map(|number| (self.points[number], self.normals[number])).unzip();
         let tree = KdTree::new(&points);
         Self { points, normals, tree }
     }

@@ -16,6 +16,7 @@ mod local_map;
 mod pose_covariance;
 mod result;
 mod rotation_search;
+mod rough_alignment;
 mod scale;
 mod scan_alignment;
 mod segment;

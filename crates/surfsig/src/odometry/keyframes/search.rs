@@ -1,46 +1,94 @@
-//! Where a sensor is that was lost: the keyframes whose keypoints its scan's match.
+//! Where a sensor is that was lost: the keyframes that see as far as its scan, or whose keypoints match those of it.
 
 use super::super::local_map::LocalMap;
 use super::super::rotation_search::{points_near, some_points};
-use super::super::scan_alignment::{ScanAlignment, align};
+use super::super::scan_alignment::{ScanAlignment, align, align_roughly};
 use super::super::settings::RelocalisationSettings;
 use super::super::thinned_scan::ThinnedScan;
+use super::super::tracker::distance_at_range;
+use super::panorama::Panorama;
 use super::ranges::Ranges;
-use super::{Keyframes, Which, in_float32};
+use super::{Keyframe, Keyframes, Which, in_float32};
 use crate::alignment::{ConsensusSettings, Correspondences};
 use crate::field::{KeypointOptions, keypoints_within, match_fields};
 use crate::{FieldOptions, FieldPlaces, Monitor, PointCloud, Radius, RigidTransform};
+use rayon::prelude::*;
+
+/// How a scan is searched among keyframes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in super::super) enum By {
+    /// How far it sees all around: little work, but the sensor is turned about its z axis alone, and sees as much.
+    Panorama,
+    /// Signatures of keypoints.
+    Signatures,
+}
 
 impl Keyframes {
-    /// Of the poses that matches propose, the one that lies best on the map of the keyframes around it, and that map.
+    /// Of the poses that a search proposes, the one that lies best on the map of the keyframes around it, and that map.
     /// `last` is where the sensor was.
     pub fn find(
         &mut self,
         scan: &ThinnedScan,
         last: &RigidTransform,
         map_range: f64,
+        by: By,
         is_believed: impl Fn(&ScanAlignment) -> bool,
     ) -> Option<(ScanAlignment, LocalMap)> {
-        let proposals = self.proposals(scan, last);
+        let settings = &self.settings.relocalisation;
+        let reach = settings.max_correspondence_distance;
+        let (proposals, distance) = match by {
+            // As far off as keyframes are from each other.
+            By::Panorama => (self.panoramas(scan), reach.max(settings.keyframe_distance * self.median_range)),
+            By::Signatures => (self.proposals(scan, last), reach),
+        };
         let settings = &self.settings.relocalisation;
         let some = some_points(scan.coarse.points(), settings.rotation_points);
         let on_map = |pose: RigidTransform| {
-            let map = self.map_of(pose.translation.into(), map_range, |_| true);
-            let near = points_near(&some, &map, &pose, settings.rotation_distance);
-            (near, pose, map)
+            let map = self.map_next_to(&pose);
+            let pose = align_roughly(scan, &map, pose, distance, &self.settings.alignment)?;
+            Some((points_near(&some, &map, &pose, settings.rotation_distance), pose))
         };
-        // To align costs as much as a tracked scan does; of equally good ones the first has most matches.
-        let best = proposals.into_iter().map(on_map).rev().max_by_key(|(near, ..)| *near);
-        let found = best.and_then(|(_, pose, map)| {
+        // To align costs as much as a tracked scan does; of equally good ones the first was proposed first.
+        let best = proposals.into_iter().filter_map(on_map).rev().max_by_key(|(near, _)| *near);
+        let found = best.and_then(|(_, pose)| {
+            let map = self.map_of(pose.translation.into(), map_range, |_| true);
             let known = |pose: &RigidTransform| self.would_have_seen(pose, Which::All);
-            let distance = settings.max_correspondence_distance;
-            let found = align(scan, &map, pose, distance, &self.settings.alignment, known)?;
+            let found = align(scan, &map, pose, reach, &self.settings.alignment, known)?;
             is_believed(&found).then_some((found, map))
         });
         if found.is_some() {
             self.searched.clear();
         }
         found
+    }
+
+    /// Poses at the keyframes that see as far all around as a scan does, if it is turned.
+    fn panoramas(&self, scan: &ThinnedScan) -> Vec<RigidTransform> {
+        let panorama = Panorama::new(scan.coarse.points());
+        let compared = |keyframe: &Keyframe| {
+            let (difference, angle) = keyframe.panorama.compared(&panorama);
+            let turn = RigidTransform::from_rotation_vector([0.0, 0.0, angle], [0.0; 3]);
+            (difference, keyframe.T_map_scan * turn)
+        };
+        let mut poses: Vec<(f32, RigidTransform)> = self.kept.par_iter().map(compared).collect();
+        poses.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let settings = &self.settings.relocalisation;
+        let apart = settings.keyframe_distance * self.median_range;
+        self.distinct(poses.into_iter().map(|(_, pose)| pose), apart)
+    }
+
+    /// The first poses that are apart from those before, of a point at the median range, as many as are tried.
+    fn distinct(&self, poses: impl Iterator<Item = RigidTransform>, apart: f64) -> Vec<RigidTransform> {
+        let mut chosen: Vec<RigidTransform> = Vec::new();
+        for pose in poses {
+            let is_apart = |other: &RigidTransform| {
+                distance_at_range(self.median_range, &(other.inverse() * pose)) > apart
+            };
+            if chosen.len() < self.settings.relocalisation.max_trials && chosen.iter().all(is_apart) {
+                chosen.push(pose);
+            }
+        }
+        chosen
     }
 
     /// The keyframes that are searched now: half of them the nearest to where the sensor was, the others those that see
@@ -103,8 +151,8 @@ impl Keyframes {
         }
         self.forget_descriptions();
         proposals.sort_by_key(|(agree, _)| std::cmp::Reverse(*agree));
-        proposals.truncate(self.settings.relocalisation.max_trials);
-        proposals.into_iter().map(|(_, pose)| pose).collect()
+        let apart = self.settings.prediction.min_correspondence_distance;
+        self.distinct(proposals.into_iter().map(|(_, pose)| pose), apart)
     }
 
     /// Forgets the oldest descriptions, where there are too many: each takes more than all else of its keyframe.
@@ -124,6 +172,7 @@ fn described(points: &[[f32; 3]], radius: f64, settings: &RelocalisationSettings
     let keypoints = KeypointOptions {
         count: settings.keypoints,
         candidates_per_radius: settings.candidates_per_radius,
+        compared: settings.compared,
         ..Default::default()
     };
     let found = Radius::new(radius).and_then(|radius| {

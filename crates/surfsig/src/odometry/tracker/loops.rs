@@ -28,6 +28,11 @@ impl Tracker {
         self.keyframes.has_earlier_near(expected, before)
     }
 
+    /// The number of the keyframe next to a pose, and its pose.
+    pub fn keyframe_next_to(&self, pose: &RigidTransform) -> Option<(usize, RigidTransform)> {
+        self.keyframes.nearest_to(pose)
+    }
+
     /// Where a scan of a later map lies on the keyframes of this one, which the sensor has left: the pose of that scan, and
     /// that of the keyframe next to it with its number. Scans from `before` on do not count.
     pub fn seen_again(
@@ -52,7 +57,9 @@ impl Tracker {
         let settings = &self.settings.relocalisation;
         let known = |pose: &RigidTransform| self.keyframes.would_have_seen(pose, which);
         let distance = settings.max_correspondence_distance;
-        translations_on_map(scan.coarse.points(), map, expected, settings)
+        let starts = translations_on_map(scan.coarse.points(), map, expected, settings);
+        self.trials(distance)
+            .likeliest(scan, map, starts, 0)
             .into_iter()
             .filter_map(|start| align(scan, map, start, distance, &self.settings.alignment, known))
             .filter(|there| there.free_directions.is_empty() && self.is_met(there))
