@@ -82,7 +82,7 @@ def by_small_gicp(voxel: float, has_times: bool) -> Callable[[Array, Array], Arr
     expected where the last motion leads, aligned with the means and covariances of a map's voxels, and put
     into it.
     """
-    import small_gicp  # type: ignore[import-not-found]
+    import small_gicp
 
     voxels: Any = small_gicp.GaussianVoxelMap(voxel)
     voxels.set_lru(**RECENT)

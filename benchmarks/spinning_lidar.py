@@ -138,8 +138,8 @@ def by_peer(
         arrays |= {f"times{number}": scan.fields["time"] / PERIOD + 0.5 for number, scan in enumerate(scans)}
         np.savez(file, allow_pickle=True, **arrays)
         try:
-            program = [peer_python(), HERE / "odometry_peers.py", file, "--method", method, "--voxel", "1.0"]
-            answer = run_json(program, threads=1)
+            program: list[str | Path] = [peer_python(), HERE / "odometry_peers.py", file]
+            answer = run_json([*program, "--method", method, "--voxel", "1.0"], threads=1)
         except PeerUnavailable as error:
             return f"not run: {error}", ""
     position, angles = trajectory(speed, rate, seed)
