@@ -67,20 +67,37 @@ impl ScanAlignment {
     }
 }
 
+/// Where an alignment starts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Start {
+    pub pose: RigidTransform,
+    /// Between corresponding points, in the first round.
+    pub max_distance: f64,
+    /// Whether nothing is known of the motion to it: few points may then lead astray, and the first round takes all.
+    pub is_guess: bool,
+}
+
+impl Start {
+    /// A start that a motion or a search has led to.
+    pub fn near(pose: RigidTransform, max_distance: f64) -> Self {
+        Self { pose, max_distance, is_guess: false }
+    }
+}
+
 /// Aligns a scan from a pose nearby; `None` where it hardly meets the map. Along motions that the map does not determine
 /// the pose stays where it started.
 ///
-/// `max_distance` is between corresponding points, in the first round; `would_be_known` tells by the scan's pose which
-/// of its points earlier scans would have measured.
+/// `would_be_known` tells by the scan's pose which of its points earlier scans would have measured.
 pub(super) fn align<F: Fn([f64; 3]) -> bool>(
     scan: &ThinnedScan,
     map: &LocalMap,
-    start: RigidTransform,
-    max_distance: f64,
+    start: Start,
     settings: &ScanAlignmentSettings,
     would_be_known: impl FnOnce(&RigidTransform) -> F,
 ) -> Option<ScanAlignment> {
-    let mut pose = align_roughly(scan, map, start, max_distance, settings)?;
+    let Start { pose: start, max_distance, is_guess } = start;
+    let first = if is_guess { &scan.coarse } else { &scan.few };
+    let mut pose = gicp_round(first, map, start, max_distance, settings)?;
     pose = gicp_round(&scan.coarse, map, pose, max_distance.min(settings.max_point_distance), settings)?;
     let mut correspondences = Correspondences::new(scan.points.len());
     for _ in 0..settings.plane_steps {

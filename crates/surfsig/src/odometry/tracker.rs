@@ -14,7 +14,7 @@ use super::local_map::LocalMap;
 use super::pose_covariance::Covariance;
 use super::result::ScanStatus;
 use super::scale::{Scale, distances};
-use super::scan_alignment::{ScanAlignment, align};
+use super::scan_alignment::{ScanAlignment, Start, align};
 use super::settings::OdometrySettings;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
@@ -294,17 +294,14 @@ impl Tracker {
     }
 
     fn aligned(&self, scan: &ThinnedScan, start: RigidTransform) -> Option<ScanAlignment> {
-        self.aligned_within(scan, start, self.correspondence_distance())
+        let max_distance = self.correspondence_distance();
+        let is_guess = !self.has_motion && !self.is_lost;
+        self.aligned_from(scan, Start { pose: start, max_distance, is_guess })
     }
 
-    fn aligned_within(
-        &self,
-        scan: &ThinnedScan,
-        start: RigidTransform,
-        distance: f64,
-    ) -> Option<ScanAlignment> {
+    fn aligned_from(&self, scan: &ThinnedScan, start: Start) -> Option<ScanAlignment> {
         let known = |pose: &RigidTransform| self.keyframes.would_have_seen(pose, Which::Loaded);
-        align(scan, &self.map, start, distance, &self.settings.alignment, known)
+        align(scan, &self.map, start, &self.settings.alignment, known)
     }
 
     /// As far as predictions were wrong (KISS-ICP's threshold, Vizzo and others, 2023).

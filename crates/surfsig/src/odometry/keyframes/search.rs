@@ -2,7 +2,7 @@
 
 use super::super::local_map::LocalMap;
 use super::super::rotation_search::{points_near, some_points};
-use super::super::scan_alignment::{ScanAlignment, align, align_roughly};
+use super::super::scan_alignment::{ScanAlignment, Start, align, align_roughly};
 use super::super::settings::RelocalisationSettings;
 use super::super::thinned_scan::ThinnedScan;
 use super::super::tracker::distance_at_range;
@@ -53,13 +53,48 @@ impl Keyframes {
         let found = best.and_then(|(_, pose)| {
             let map = self.map_of(pose.translation.into(), map_range, |_| true);
             let known = |pose: &RigidTransform| self.would_have_seen(pose, Which::All);
-            let found = align(scan, &map, pose, reach, &self.settings.alignment, known)?;
+            let found = align(scan, &map, Start::near(pose, reach), &self.settings.alignment, known)?;
             is_believed(&found).then_some((found, map))
         });
+        let found =
+            found.filter(|(found, _)| by == By::Signatures || self.do_matches_say(scan, &found.T_map_scan));
         if found.is_some() {
             self.searched.clear();
         }
         found
+    }
+
+    /// Whether matches with the keyframe next to a pose propose the same: along a corridor there are other places that a
+    /// scan fits to.
+    fn do_matches_say(&mut self, scan: &ThinnedScan, pose: &RigidTransform) -> bool {
+        let apart = |other: &RigidTransform| distance_at_range(self.median_range, &(other.inverse() * *pose));
+        let to_keyframe = |number: &usize| apart(&self.kept[*number].T_map_scan);
+        let nearest = (0..self.kept.len()).min_by(|a, b| to_keyframe(a).total_cmp(&to_keyframe(b)));
+        let Some(number) = nearest else { return false };
+        let settings = &self.settings.relocalisation;
+        let ours = described(&in_float32(&scan.means(settings.detail_voxel)), self.patch_radius, settings);
+        let matched = self.matched(number, &ours);
+        self.forget_descriptions();
+        let apart = |other: &RigidTransform| distance_at_range(self.median_range, &(other.inverse() * *pose));
+        let settings = &self.settings.relocalisation;
+        matched.is_some_and(|(agree, matched)| {
+            agree >= settings.confirming_matches && apart(&matched) <= settings.confirming_distance
+        })
+    }
+
+    /// The pose of a scan that most matches with a keyframe agree with, and how many, if they are enough.
+    fn matched(&mut self, number: usize, ours: &FieldPlaces) -> Option<(usize, RigidTransform)> {
+        let (radius, settings) = (self.patch_radius, &self.settings.relocalisation);
+        let keyframe = &mut self.kept[number];
+        if keyframe.described.is_none() {
+            self.described.push_back(keyframe.number);
+        }
+        let theirs = keyframe.described.get_or_insert_with(|| described(&keyframe.detail, radius, settings));
+        let found = match_fields(ours, theirs, true);
+        let matches = Correspondences::new(&found, ours, theirs, ConsensusSettings::default());
+        let transform = matches.agreed_transform();
+        let agree = matches.inlier_count(&transform);
+        (agree >= settings.min_matches).then(|| (agree, keyframe.T_map_scan * transform))
     }
 
     /// Poses at the keyframes that see as far all around as a scan does, if it is turned.
@@ -126,28 +161,17 @@ impl Keyframes {
         }
         let radius = self.patch_radius;
         let settings = &self.settings.relocalisation;
-        let consensus = ConsensusSettings::default();
         let ours = described(&in_float32(&scan.means(settings.detail_voxel)), radius, settings);
         let mut proposals: Vec<(usize, RigidTransform)> = Vec::new();
         let mut newly_described = 0;
         for number in chosen {
-            let keyframe = &mut self.kept[number];
+            let keyframe = &self.kept[number];
             newly_described += usize::from(keyframe.described.is_none());
-            if keyframe.described.is_none() && newly_described > settings.max_described {
+            if keyframe.described.is_none() && newly_described > self.settings.relocalisation.max_described {
                 continue;
             }
-            if keyframe.described.is_none() {
-                self.described.push_back(keyframe.number);
-            }
-            let theirs =
-                keyframe.described.get_or_insert_with(|| described(&keyframe.detail, radius, settings));
             self.searched.insert(keyframe.number);
-            let matches = Correspondences::new(&match_fields(&ours, theirs, true), &ours, theirs, consensus);
-            let transform = matches.agreed_transform();
-            let agree = matches.inlier_count(&transform);
-            if agree >= settings.min_matches {
-                proposals.push((agree, keyframe.T_map_scan * transform));
-            }
+            proposals.extend(self.matched(number, &ours));
         }
         self.forget_descriptions();
         proposals.sort_by_key(|(agree, _)| std::cmp::Reverse(*agree));
@@ -180,4 +204,46 @@ fn described(points: &[[f32; 3]], radius: f64, settings: &RelocalisationSettings
         keypoints_within(&cloud, radius, &keypoints, &options, &monitor)
     });
     found.unwrap_or_else(|_| FieldPlaces::new(radius))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::deskewing::{MeasuredScan, MotionWithin};
+    use super::super::super::settings::OdometrySettings;
+    use super::*;
+    use crate::random::uniform;
+    use nalgebra::Vector6;
+
+    #[test]
+    fn the_oldest_descriptions_are_forgotten() {
+        let mut settings = OdometrySettings::default();
+        settings.relocalisation.max_descriptions = 3;
+        let at = |i: usize, k: u64| uniform(i, k) - 0.5;
+        let floor = (0..4000).map(|i| [40.0 * at(i, 0), 40.0 * at(i, 1), -4.0]);
+        let within = MotionWithin {
+            times: Vec::new(),
+            twist: Vector6::zeros(),
+            since: None,
+            farthest: 1.0,
+            deviation: 1.0,
+            range: 15.0,
+        };
+        let scan = ThinnedScan::new(MeasuredScan { points: floor.collect(), times: None }, within, &settings);
+        let mut keyframes = Keyframes::new(&settings, 15.0, 5.0);
+        for number in 0..8 {
+            let pose = RigidTransform::from_rotation_vector([0.0; 3], [10.0 * f64::from(number), 0.0, 0.0]);
+            assert!(keyframes.offer(&scan, &pose, number));
+        }
+        for _ in 0..6 {
+            keyframes.proposals(&scan, &RigidTransform::identity());
+            let kept: Vec<u32> = keyframes
+                .kept
+                .iter()
+                .filter(|keyframe| keyframe.described.is_some())
+                .map(|one| one.number)
+                .collect();
+            assert!(!kept.is_empty() && kept.len() <= 3, "{kept:?}");
+            assert_eq!(kept.len(), keyframes.described.len());
+        }
+    }
 }

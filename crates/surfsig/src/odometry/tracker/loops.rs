@@ -3,7 +3,7 @@
 
 use super::super::keyframes::Which;
 use super::super::local_map::LocalMap;
-use super::super::scan_alignment::{ScanAlignment, align};
+use super::super::scan_alignment::{ScanAlignment, Start, align};
 use super::super::thinned_scan::ThinnedScan;
 use super::super::translation_search::translations_on_map;
 use super::Tracker;
@@ -61,7 +61,7 @@ impl Tracker {
         self.trials(distance)
             .likeliest(scan, map, starts, 0)
             .into_iter()
-            .filter_map(|start| align(scan, map, start, distance, &self.settings.alignment, known))
+            .filter_map(|pose| align(scan, map, Start::near(pose, distance), &self.settings.alignment, known))
             .filter(|there| there.free_directions.is_empty() && self.is_met(there))
             .max_by(|a, b| a.overlap.total_cmp(&b.overlap))
     }

@@ -5,7 +5,7 @@ use super::super::local_map::LocalMap;
 use super::super::result::ScanStatus;
 use super::super::rotation_search::{points_near, rotations_on_map, some_points};
 use super::super::rough_alignment::Trials;
-use super::super::scan_alignment::ScanAlignment;
+use super::super::scan_alignment::{ScanAlignment, Start};
 use super::super::thinned_scan::ThinnedScan;
 use super::Tracker;
 use crate::RigidTransform;
@@ -118,7 +118,7 @@ impl Tracker {
             .trials(distance)
             .likeliest(scan, &self.map, starts, self.least_near(scan, doubted))
             .into_iter()
-            .filter_map(|start| self.aligned_within(scan, start, distance))
+            .filter_map(|pose| self.aligned_from(scan, Start::near(pose, distance)))
             .filter(|found| {
                 found.free_directions.is_empty() && self.is_met(found) && self.is_better(found, doubted)
             })
@@ -171,7 +171,7 @@ impl Tracker {
         let starts = starts.iter().copied().chain(rotated);
         let found = self.trials(distance).likeliest(scan, &self.map, starts, 0).into_iter();
         found
-            .filter_map(|start| self.aligned_within(scan, start, distance))
+            .filter_map(|pose| self.aligned_from(scan, Start::near(pose, distance)))
             .filter(|found| found.free_directions.is_empty() && self.is_met(found))
             .max_by(|a, b| a.overlap.total_cmp(&b.overlap))
     }
