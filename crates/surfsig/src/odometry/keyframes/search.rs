@@ -246,4 +246,36 @@ mod tests {
             assert_eq!(kept.len(), keyframes.described.len());
         }
     }
+
+    #[test]
+    fn a_scan_was_found_where_only_the_walls_were_alike() {
+        let settings = OdometrySettings::default();
+        let at = |i: usize, k: u64| uniform(i, k) - 0.5;
+        let scan = |kind: u64| {
+            let boxes = (0..12_000).map(|i| {
+                let middle = [0, 1, 2].map(|k| [50.0, 40.0, 16.0][k] * at(i / 600, 10 * kind + k as u64));
+                let mut point = [0, 1, 2].map(|k| 5.0 * at(i, k));
+                point[i % 3] = if i % 2 == 0 { 2.5 } else { -2.5 };
+                [0, 1, 2].map(|k| middle[k] + point[k])
+            });
+            let floor = (0..6000).map(|i| [60.0 * at(i, 3), 60.0 * at(i, 4), -9.0]);
+            let within = MotionWithin {
+                times: Vec::new(),
+                twist: Vector6::zeros(),
+                since: None,
+                farthest: 1.0,
+                deviation: 1.0,
+                range: 20.0,
+            };
+            let points = floor.chain(boxes).collect();
+            ThinnedScan::new(MeasuredScan { points, times: None }, within, &settings)
+        };
+        let here = RigidTransform::identity();
+        let mut keyframes = Keyframes::new(&settings, 20.0, 5.0);
+        assert!(keyframes.offer(&scan(1), &here, 0));
+        assert!(keyframes.do_matches_say(&scan(1), &here));
+        let beside = RigidTransform::from_rotation_vector([0.0; 3], [2.0, 0.0, 0.0]);
+        assert!(!keyframes.do_matches_say(&scan(1), &beside));
+        assert!(!keyframes.do_matches_say(&scan(2), &here));
+    }
 }
