@@ -2,10 +2,10 @@
 
 python benchmarks/odometry.py --write
 
-No real sequence is part of this. The first table has KISS-ICP beside surfsig on the same scans, with the
-voxel of its default settings (1 m, made for streets) and with one of 0.3 m. The second table carries the
-sensor away: to places near its trajectory, to a building with the same walls and other furniture, and to one
-with other walls.
+No real sequence is part of this. The first table has KISS-ICP and small_gicp beside surfsig on the same
+scans, with the voxel of their default settings (1 m, made for streets) and with one of 0.3 m. The second
+table carries the sensor away: to places near its trajectory, to a building with the same walls and other
+furniture, and to one with other walls.
 """
 
 from __future__ import annotations
@@ -39,10 +39,12 @@ SENSORS = {
 WAY_COLUMNS = (
     "sensor", "scans", "points each", "tracked", "largest error of place", "of the way", "of direction",
     "error² over covariance", "processor time a scan",
-    "KISS-ICP, 1 m: largest error, processor time", "KISS-ICP, 0.3 m",
+    "KISS-ICP, 1 m: largest error, processor time", "KISS-ICP, 0.3 m", "small_gicp, 1 m", "small_gicp, 0.3 m",
 )  # fmt: skip
-KISS_VOXELS = (1.0, 0.3)
-"""Metres: its default, and what suits rooms better. With 0.15 m it takes two to four times as long."""
+PEERS = ("kiss-icp", "small_gicp")
+PEER_VOXELS = (1.0, 0.3)
+"""Metres: their default, and what suits rooms better. With 0.15 m KISS-ICP takes two to four times as
+long."""
 BACK_COLUMNS = ("sensor", "carried to", "places", "found, right", "found, wrong", "lost")
 BACK_SENSORS = ("lidar, 32 rings", "camera, 90° x 60°")
 PLACES = ("a mapped place", "the same walls, other furniture", "other walls")
@@ -99,19 +101,19 @@ def follow(name: str, lidar: Lidar, count: int) -> Row:
         f"{np.degrees(np.nanmax(turned)):.3f}°",
         f"{nees.mean():.1f}",
         f"{1000 * seconds / count:.0f} ms",
-        *(by_kiss(scans, true, voxel) for voxel in KISS_VOXELS),
+        *(by_peer(method, scans, true, voxel) for method in PEERS for voxel in PEER_VOXELS),
     )
 
 
-def by_kiss(scans: list[surfsig.PointCloud], true: Array, voxel: float) -> str:
-    """Let KISS-ICP follow the same scans, and give its largest error of place and processor time a scan."""
+def by_peer(method: str, scans: list[surfsig.PointCloud], true: Array, voxel: float) -> str:
+    """Let a peer follow the same scans, and give its largest error of place and processor time a scan."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scans.npz"
         arrays: dict[str, Any] = {f"scan{number}": scan.points for number, scan in enumerate(scans)}
         np.savez(file, **arrays)
         try:
             program: list[str | Path] = [peer_python(), HERE / "odometry_peers.py", file]
-            answer = run_json([*program, "--voxel", str(voxel)], threads=1)
+            answer = run_json([*program, "--method", method, "--voxel", str(voxel)], threads=1)
         except PeerUnavailable as error:
             return f"not run: {error}"
     off, _ = moving_sensor.errors(np.array(answer["poses"]), true)
@@ -119,7 +121,7 @@ def by_kiss(scans: list[surfsig.PointCloud], true: Array, voxel: float) -> str:
 
 
 def peer_versions() -> dict[str, str]:
-    """Give that of KISS-ICP, where it is installed."""
+    """Give those of KISS-ICP and small_gicp, where they are installed."""
     try:
         answer = run_json([peer_python(), HERE / "odometry_peers.py", "versions"], threads=1)
     except PeerUnavailable:

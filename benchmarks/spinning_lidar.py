@@ -31,7 +31,8 @@ PERIOD = 0.1
 LIDAR = simulate.Lidar(lines=32, steps=600, elevation=(-22.0, 12.0), noise=0.01, max_range=80.0)
 COLUMNS = (
     "motion", "scans", "path", "error at the end, of the path", "largest", "the same without times",
-    "KISS-ICP with times, at the end", "processor time a scan: surfsig", "KISS-ICP",
+    "KISS-ICP with times, at the end", "small_gicp without, at the end", "processor time a scan: surfsig",
+    "KISS-ICP", "small_gicp",
 )  # fmt: skip
 MOTIONS = {
     "5 m/s, 20°/s": (5.0, 20.0),
@@ -110,7 +111,8 @@ def follow(name: str, speed: float, rate: float, seed: int, seconds: float) -> R
     off, _ = moving_sensor.errors(found.poses, true)
     bent = surfsig.estimate_odometry([PointCloud(cloud.points, viewpoint=np.zeros(3)) for cloud in scans])
     without, _ = moving_sensor.errors(bent.poses, true)
-    kiss, kiss_taken = by_kiss(scans, seed, speed, rate, seconds, way)
+    kiss, kiss_taken = by_peer("kiss-icp", scans, seed, speed, rate, seconds, way)
+    small, small_taken = by_peer("small_gicp", scans, seed, speed, rate, seconds, way)
     return (
         name,
         f"{len(scans)}, {found.counts()['tracked']} tracked",
@@ -119,22 +121,25 @@ def follow(name: str, speed: float, rate: float, seed: int, seconds: float) -> R
         f"{np.nanmax(off):.3f} m",
         f"{without[-1] / way:.2%}",
         kiss,
+        small,
         f"{1000 * taken / len(scans):.0f} ms",
         kiss_taken,
+        small_taken,
     )
 
 
-def by_kiss(
-    scans: list[PointCloud], seed: int, speed: float, rate: float, seconds: float, way: float
+def by_peer(
+    method: str, scans: list[PointCloud], seed: int, speed: float, rate: float, seconds: float, way: float
 ) -> tuple[str, str]:
-    """Let KISS-ICP follow the same scans with their times."""
+    """Let a peer follow the same scans with their times, which small_gicp has no use for."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scans.npz"
         arrays = {f"scan{number}": scan.points for number, scan in enumerate(scans)}
         arrays |= {f"times{number}": scan.fields["time"] / PERIOD + 0.5 for number, scan in enumerate(scans)}
         np.savez(file, allow_pickle=True, **arrays)
         try:
-            answer = run_json([peer_python(), HERE / "odometry_peers.py", file, "--voxel", "1.0"], threads=1)
+            program: list[str | Path] = [peer_python(), HERE / "odometry_peers.py", file]
+            answer = run_json([*program, "--method", method, "--voxel", "1.0"], threads=1)
         except PeerUnavailable as error:
             return f"not run: {error}", ""
     position, angles = trajectory(speed, rate, seed)

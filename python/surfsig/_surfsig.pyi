@@ -34,6 +34,7 @@ __all__ = [
     "consistent_directions",
     "coordinate_resolution",
     "coordinate_steps",
+    "deskewed_points",
     "different_places",
     "distance_to_nearest",
     "estimated_viewpoint",
@@ -57,8 +58,10 @@ __all__ = [
     "refine_poses",
     "register",
     "sampled_numbers",
+    "spin_times",
     "surface_of_sums",
     "surface_sums",
+    "time_range",
     "voxel_representatives",
     "write_e57",
 ]
@@ -706,6 +709,21 @@ def hidden_from(
 ) -> NDArray[np.bool_]: ...
 def measured_from_origin(points: NDArray[np.float64], spacing: float) -> bool: ...
 def estimated_viewpoint(points: NDArray[np.float64]) -> list[float] | None: ...
+def deskewed_points(
+    points: NDArray[np.float32] | NDArray[np.float64],
+    times: NDArray[np.float64],
+    twist: list[float],
+    *,
+    origin: list[float],
+) -> NDArray[np.float64]: ...
+def spin_times(
+    points: NDArray[np.float32] | NDArray[np.float64],
+    *,
+    origin: list[float],
+    sensor: list[float],
+    spin_rate: float,
+) -> NDArray[np.float64]: ...
+def time_range(times: NDArray[np.float64], fewest: int) -> list[float] | None: ...
 def free_directions(
     points: NDArray[np.float64], normals: NDArray[np.float64]
 ) -> list[tuple[Literal["rotation", "translation"], list[float] | None, list[float] | None]]: ...

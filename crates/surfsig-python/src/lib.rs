@@ -77,7 +77,7 @@ mod _surfsig {
     #[pymodule_export]
     use crate::neighbor_distances::mean_neighbor_distances;
     #[pymodule_export]
-    use crate::odometry::{Odometry, OdometrySettings};
+    use crate::odometry::{Odometry, OdometrySettings, deskewed_points, spin_times, time_range};
     #[pymodule_export]
     use crate::primitive::{Primitive, fit_primitive};
     #[pymodule_export]

@@ -4,7 +4,7 @@ use crate::extract::Points;
 use crate::registration::free_directions_to_python;
 use crate::settings::settings_class;
 use crate::to_python;
-use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use surfsig::Scan;
@@ -50,6 +50,48 @@ settings_class! {
         /// Scans that must follow each other where the sensor is found again.
         scans_on_trial: usize = relocalisation.scans_on_trial,
     }
+}
+
+/// Points (n, 3) where they would have been measured at one time, as offsets from the origin, by the sensor's twist (6,)
+/// and their times (n,); see `surfsig.deskew`.
+#[pyfunction]
+#[pyo3(signature = (points, times, twist, *, origin))]
+pub fn deskewed_points<'py>(
+    py: Python<'py>,
+    points: Points<'py>,
+    times: PyReadonlyArray1<'py, f64>,
+    twist: [f64; 6],
+    origin: [f64; 3],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (cloud, times) = (points.cloud(origin)?, times.as_slice()?);
+    let found = py.detach(|| surfsig::deskew(&cloud, times, twist)).map_err(to_python)?;
+    let count = found.len();
+    found.into_flattened().into_pyarray(py).reshape([count, 3])
+}
+
+/// When a lidar that spins about z measured points (n, 3), by its rotations a second; see `surfsig.odometry.point_times`.
+#[pyfunction]
+#[pyo3(signature = (points, *, origin, sensor, spin_rate))]
+pub fn spin_times<'py>(
+    py: Python<'py>,
+    points: Points<'py>,
+    origin: [f64; 3],
+    sensor: [f64; 3],
+    spin_rate: f64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let cloud = points.cloud(origin)?;
+    Ok(py.detach(|| surfsig::spin_times(&cloud, sensor, spin_rate)).into_pyarray(py))
+}
+
+/// The first and the last of the finite times (n,), or None if fewer than `fewest` are different.
+#[pyfunction]
+pub fn time_range(
+    py: Python<'_>,
+    times: PyReadonlyArray1<'_, f64>,
+    fewest: usize,
+) -> PyResult<Option<[f64; 2]>> {
+    let times = times.as_slice()?;
+    Ok(py.detach(|| surfsig::time_range(times, fewest)))
 }
 
 /// The scan, the earlier one, T_earlier_scan, and the scan's pose by the way around.

@@ -108,6 +108,7 @@ pub use neighbor_distances::mean_neighbor_distances;
 pub use odometry::{
     ExpectationSettings, LoopClosure, MapSettings, Odometry, OdometrySettings, PredictionSettings,
     RelocalisationSettings, ScaleSettings, ScanAlignmentSettings, ScanPose, ScanStatus, SegmentSettings,
+    deskew, spin_times, time_range,
 };
 pub use orientation::consistent_directions;
 pub use point_cloud::{Offsets, PointCloud, Radius};

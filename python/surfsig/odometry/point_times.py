@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfsig import geometry
+from surfsig import _surfsig
 from surfsig.errors import InvalidInputError
 from surfsig.point_cloud import PointCloud
 
@@ -64,10 +64,10 @@ def find_point_times(
     field = _time_field(cloud)
     if field is None:
         return None
-    finite = np.isfinite(field)
-    if len(np.unique(field[finite])) < _FEWEST_TIMES:
+    known = _surfsig.time_range(field, _FEWEST_TIMES)
+    if known is None:
         return None
-    low, high = float(field[finite].min()), float(field[finite].max())
+    low, high = known
     durations = {unit: unit * (high - low) for unit in _UNITS}
     possible = [unit for unit, span in durations.items() if _DURATIONS[0] <= span <= _DURATIONS[1]]
     if not possible:
@@ -86,9 +86,11 @@ def find_point_times(
 def _times_by_angle(cloud: PointCloud, spin_rate: float) -> PointTimes:
     if not np.isfinite(spin_rate) or spin_rate == 0.0:
         raise InvalidInputError(f"spin_rate must be a finite number other than 0, not {spin_rate}")
-    about = cloud.offsets + cloud.origin - (0.0 if cloud.viewpoint is None else cloud.viewpoint)
-    turns = np.arctan2(about[:, 1], about[:, 0]) / (2.0 * np.pi)
-    return PointTimes(np.asarray(turns / spin_rate, np.float64), 1.0 / abs(spin_rate), None)
+    sensor = np.zeros(3) if cloud.viewpoint is None else cloud.viewpoint
+    seconds = _surfsig.spin_times(
+        cloud.offsets, origin=cloud.origin.tolist(), sensor=sensor.tolist(), spin_rate=spin_rate
+    )
+    return PointTimes(seconds, 1.0 / abs(spin_rate), None)
 
 
 def _time_field(cloud: PointCloud) -> Array | None:
@@ -96,7 +98,7 @@ def _time_field(cloud: PointCloud) -> Array | None:
     for name in TIME_FIELDS:
         values = by_name.get(name)
         if values is not None and values.ndim == 1 and values.dtype.kind in "fiu":
-            return values.astype(np.float64)
+            return np.ascontiguousarray(values, np.float64)
     return None
 
 
@@ -149,10 +151,7 @@ def deskew(
             raise InvalidInputError(f"times must be ({len(cloud)},), not {seconds.shape}")
     if not np.isfinite(motion).all():
         return cloud
-    # The transform exp(t m) is the same for equal times, of which a spinning lidar has some thousand.
-    moments, which = np.unique(np.round(np.where(np.isfinite(seconds), seconds, 0.0), 6), return_inverse=True)
-    transforms = np.array([geometry.exp_twist(moment * motion) for moment in moments.tolist()])
-    chosen = transforms.reshape(-1, 4, 4)[which]
-    points = cloud.offsets + cloud.origin
-    moved = np.einsum("nij,nj->ni", chosen[:, :3, :3], points) + chosen[:, :3, 3] - cloud.origin
+    moved = _surfsig.deskewed_points(
+        cloud.offsets, np.ascontiguousarray(seconds), motion.tolist(), origin=cloud.origin.tolist()
+    )
     return replace(cloud, offsets=moved.astype(cloud.offsets.dtype))

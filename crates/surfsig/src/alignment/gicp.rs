@@ -108,8 +108,8 @@ pub fn gicp(
 }
 
 /// [`gicp`] with any target.
-pub(crate) fn gicp_with(
-    target: &impl GicpTarget,
+pub(crate) fn gicp_with<Target: GicpTarget>(
+    target: &Target,
     source: &GicpCloud,
     start: RigidTransform,
     settings: &GicpSettings,
@@ -117,9 +117,10 @@ pub(crate) fn gicp_with(
     let mut transform = start;
     let mut inliers = 0;
     let mut damping = DAMPING;
+    let mut memory = vec![Target::Memory::default(); source.len()];
     for _ in 0..settings.max_iterations {
         let correspondences =
-            correspondences(target, source, &transform, settings.max_correspondence_distance);
+            correspondences(target, source, &transform, settings.max_correspondence_distance, &mut memory);
         inliers = correspondences.len();
         if inliers == 0 {
             break;
@@ -140,14 +141,16 @@ pub(crate) fn gicp_with(
 }
 
 /// The nearest point of the target for each of the source, where there is one.
-fn correspondences(
-    target: &impl GicpTarget,
+fn correspondences<Target: GicpTarget>(
+    target: &Target,
     source: &GicpCloud,
     transform: &RigidTransform,
     reach: f64,
+    memory: &mut [Target::Memory],
 ) -> Vec<Correspondence> {
-    let correspondence = |(point, normal): (&[f64; 3], &[f64; 3])| {
-        let (there, facing) = target.surface(target.nearest(transform.transform_point(*point), reach)?);
+    let correspondence = |(point, normal, memory): (&[f64; 3], &[f64; 3], &mut Target::Memory)| {
+        let nearest = target.nearest_again(transform.transform_point(*point), reach, memory);
+        let (there, facing) = target.surface(nearest?);
         // C_B + R C_A R^T of pieces of plane, whose covariances are 1 - (1 - flatness) n n^T.
         let mut joint = Matrix3::from_diagonal_element(2.0);
         for n in [Vector3::from(facing), transform.rotation * Vector3::from(*normal)] {
@@ -156,7 +159,7 @@ fn correspondences(
         let information = joint.try_inverse()?;
         Some(Correspondence { source: (*point).into(), target: there.into(), information })
     };
-    let pairs = (&source.points, &source.normals).into_par_iter().with_min_len(PART);
+    let pairs = (&source.points, &source.normals, memory).into_par_iter().with_min_len(PART);
     pairs.filter_map(correspondence).collect()
 }
 
@@ -254,7 +257,7 @@ mod tests {
     fn the_gradient_is_that_of_the_error() {
         let target = GicpCloud::new(room());
         let at = RigidTransform::from_rotation_vector([0.02, 0.01, -0.02], [0.2, -0.3, 0.1]);
-        let pairs = correspondences(&target, &target, &at, 3.0);
+        let pairs = correspondences(&target, &target, &at, 3.0, &mut vec![(); target.len()]);
         let equations = normal_equations(&pairs, &at);
         assert!((equations.error - error(&pairs, &at)).abs() < 1e-9 * equations.error);
         for k in 0..6 {

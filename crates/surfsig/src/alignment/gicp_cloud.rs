@@ -1,6 +1,7 @@
 //! Points with the normals of the surface around each, as generalised ICP aligns them.
 
 use crate::kd_tree::KdTree;
+use crate::random::some_of;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
@@ -51,6 +52,15 @@ impl GicpCloud {
         Self { points, normals, tree }
     }
 
+    /// At most `count` of the points, with the normals that they have among all.
+    pub(crate) fn sample(&self, count: usize) -> Self {
+        let numbers = some_of(self.len(), count);
+        let (points, normals): (Vec<[f64; 3]>, Vec<[f64; 3]>) =
+            numbers.into_iter().map(|number| (self.points[number], self.normals[number])).unzip();
+        let tree = KdTree::new(&points);
+        Self { points, normals, tree }
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.points.len()
@@ -76,15 +86,25 @@ impl GicpCloud {
 ///
 /// A [`GicpCloud`] is one; a map to which points are added keeps its own.
 pub(crate) trait GicpTarget: Sync {
+    /// What is kept of a point of the source from step to step.
+    type Memory: Clone + Default + Send;
     /// The number of the nearest point within a reach.
     fn nearest(&self, at: [f64; 3], reach: f64) -> Option<u32>;
+    /// The same for a point of the source that moves a little at each step.
+    fn nearest_again(&self, at: [f64; 3], reach: f64, memory: &mut Self::Memory) -> Option<u32>;
     /// The point of a number, and its unit normal, of which the side is open; 0 where it is on no plane.
     fn surface(&self, number: u32) -> ([f64; 3], [f64; 3]);
 }
 
 impl GicpTarget for GicpCloud {
+    type Memory = ();
+
     fn nearest(&self, at: [f64; 3], reach: f64) -> Option<u32> {
         self.tree.nearest(at, reach).map(|(number, _)| number)
+    }
+
+    fn nearest_again(&self, at: [f64; 3], reach: f64, (): &mut ()) -> Option<u32> {
+        self.nearest(at, reach)
     }
 
     fn surface(&self, number: u32) -> ([f64; 3], [f64; 3]) {

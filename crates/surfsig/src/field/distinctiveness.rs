@@ -42,13 +42,15 @@ pub fn field_distinctiveness(
     threads: Option<usize>,
     monitor: &Monitor,
 ) -> Result<Vec<f32>, Error> {
-    with_threads(threads, || distinctiveness(vectors, places, radius, monitor))?
+    let all: Vec<usize> = (0..vectors.len()).collect();
+    with_threads(threads, || distinctiveness(vectors, places, &all, radius, monitor))?
 }
 
-/// The same, on the threads that are there.
+/// The same, on the threads that are there, where only some places are compared with each: they have numbers.
 pub(super) fn distinctiveness(
     vectors: &[[f32; FIELD_SIGNATURE]],
     places: &[[f64; 3]],
+    among: &[usize],
     radius: Radius,
     monitor: &Monitor,
 ) -> Result<Vec<f32>, Error> {
@@ -57,13 +59,14 @@ pub(super) fn distinctiveness(
     let apart = |a: usize, b: usize| {
         (0..3).map(|axis| (places[a][axis] - places[b][axis]).powi(2)).sum::<f64>() >= radius.get().powi(2)
     };
-    let counted = LIKE.min(vectors.len());
+    let counted = LIKE.min(among.len());
     let unlike = |largest: &Largest| {
         let distances =
             largest[LIKE - counted..].iter().map(|&product| (2.0 - 2.0 * product).max(0.0).sqrt());
         distances.sum::<f32>() / counted as f32
     };
-    let panels: Vec<Panel<FIELD_SIGNATURE>> = vectors.par_chunks(COLUMNS).map(Panel::of).collect();
+    let compared: Vec<[f32; FIELD_SIGNATURE]> = among.iter().map(|&other| vectors[other]).collect();
+    let panels: Vec<Panel<FIELD_SIGNATURE>> = compared.par_chunks(COLUMNS).map(Panel::of).collect();
     let found: Vec<Vec<f32>> = (0..vectors.len())
         .into_par_iter()
         .step_by(TOGETHER)
@@ -78,7 +81,7 @@ pub(super) fn distinctiveness(
                         let place = first + r;
                         if place < vectors.len() {
                             keep_largest(&mut largest[place - start], products, |c| {
-                                others + c < places.len() && apart(place, others + c)
+                                among.get(others + c).is_some_and(|&other| apart(place, other))
                             });
                         }
                     }
@@ -120,13 +123,19 @@ mod tests {
             })
             .collect();
         let places: Vec<[f64; 3]> = (0..150).map(|i| [0, 1, 2].map(|a| f64::from(number(i, a)))).collect();
-        for count in [1, 4, 150] {
+        for (count, step) in [(1, 1), (4, 1), (150, 1), (150, 7)] {
             let (vectors, places) = (&vectors[..count], &places[..count]);
             let radius = Radius::new(0.5).unwrap();
-            let found = field_distinctiveness(vectors, places, radius, Some(2), &Monitor::default()).unwrap();
+            let among: Vec<usize> = (0..count).step_by(step).collect();
+            let found = match step {
+                1 => field_distinctiveness(vectors, places, radius, Some(2), &Monitor::default()),
+                _ => distinctiveness(vectors, places, &among, radius, &Monitor::default()),
+            };
+            let found = found.unwrap();
             for i in 0..count {
-                let mut distances: Vec<f64> = (0..count)
-                    .map(|j| {
+                let mut distances: Vec<f64> = among
+                    .iter()
+                    .map(|&j| {
                         let apart =
                             (0..3).map(|a| (places[i][a] - places[j][a]).powi(2)).sum::<f64>() >= 0.25;
                         let product = vectors[i].iter().zip(&vectors[j]).map(|(a, b)| a * b).sum::<f32>();

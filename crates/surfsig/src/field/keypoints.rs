@@ -2,6 +2,7 @@
 
 use super::{FieldOptions, FieldPlaces, distinctiveness::distinctiveness, signatures_within};
 use crate::kd_tree::KdTree;
+use crate::random::some_of;
 use crate::statistics::median;
 use crate::{Error, Monitor, PointCloud, Queries, Radius, voxel_representatives, with_threads};
 
@@ -22,11 +23,14 @@ pub struct KeypointOptions {
     pub spacing: Option<f64>,
     /// Voxels along a patch's radius, of which each gives one candidate.
     pub candidates_per_radius: f64,
+    /// Candidates that each is compared with to tell how distinctive it is, at most: all by default. The time grows with
+    /// this number times that of all candidates.
+    pub compared: usize,
 }
 
 impl Default for KeypointOptions {
     fn default() -> Self {
-        Self { count: 1000, spacing: None, candidates_per_radius: 8.0 }
+        Self { count: 1000, spacing: None, candidates_per_radius: 8.0, compared: usize::MAX }
     }
 }
 
@@ -82,7 +86,7 @@ pub(crate) fn keypoints_within(
     let points: Vec<[f64; 3]> = candidates.iter().filter_map(|&i| cloud.position(i as usize)).collect();
     let found = signatures_within(cloud, radius, &Queries::Indices(&candidates), options, monitor)?;
     let found = FieldPlaces::known(size, &candidates, &points, &found);
-    let order = most_distinctive_first(&found, radius, monitor)?;
+    let order = most_distinctive_first(&found, keypoints.compared, radius, monitor)?;
     let chosen = match keypoints.spacing {
         Some(spacing) => spaced(&found.points, &order, spacing),
         None => {
@@ -97,10 +101,12 @@ pub(crate) fn keypoints_within(
 
 fn most_distinctive_first(
     found: &FieldPlaces,
+    compared: usize,
     radius: Radius,
     monitor: &Monitor,
 ) -> Result<Vec<usize>, Error> {
-    let unlike = distinctiveness(&found.vectors, &found.points, radius, monitor)?;
+    let unlike =
+        distinctiveness(&found.vectors, &found.points, &some_of(found.len(), compared), radius, monitor)?;
     let full = median(found.count.iter().map(|&count| f64::from(count)).collect()).unwrap_or(1.0);
     let score = |place: usize| f64::from(unlike[place]) * (f64::from(found.count[place]) / full).min(1.0);
     let scores: Vec<f64> = (0..found.len()).map(score).collect();

@@ -13,6 +13,9 @@ use std::sync::LazyLock;
 /// Angles about the axis that are tried; the best one lies between two of them.
 const ANGLES: usize = 128;
 
+/// Vectors of one set that a thread takes at a time, where each has to be compared with all of another set.
+const TOGETHER: usize = 16 * ROWS;
+
 /// Cosine and sine of each of them.
 static CIRCLE: LazyLock<[[f64; 2]; ANGLES]> = LazyLock::new(|| {
     std::array::from_fn(|step| {
@@ -53,8 +56,10 @@ pub fn match_fields(source: &FieldPlaces, target: &FieldPlaces, mutual: bool) ->
     if source.is_empty() || target.is_empty() {
         return Vec::new();
     }
-    let nearest = most_similar(&source.vectors, &target.vectors, 1);
-    let back = if mutual { most_similar(&target.vectors, &source.vectors, 1) } else { Vec::new() };
+    let [nearest, back] = match mutual {
+        true => most_similar_of_both(&source.vectors, &target.vectors),
+        false => [most_similar(&source.vectors, &target.vectors, 1), Vec::new()],
+    };
     let is_mutual = |&(place, (other, _)): &(usize, (usize, f32))| !mutual || back[other].0 == place;
     let mut kept: Vec<(usize, (usize, f32))> = nearest.into_iter().enumerate().filter(is_mutual).collect();
     kept.sort_by(|a, b| b.1.1.total_cmp(&a.1.1));
@@ -122,6 +127,50 @@ fn most_similar(
         best[..some.len()].concat()
     };
     vectors.par_chunks(ROWS).flat_map_iter(of_some).collect()
+}
+
+/// For each vector of one set the number of the most similar one of the other, of equal ones the first, and the product;
+/// and the same for each of the other set. Each product is made once, and is the same either way.
+fn most_similar_of_both(
+    vectors: &[[f32; FIELD_SIGNATURE]],
+    others: &[[f32; FIELD_SIGNATURE]],
+) -> [Vec<(usize, f32)>; 2] {
+    let set = InstructionSet::detect();
+    let panels: Vec<Panel<FIELD_SIGNATURE>> = others.par_chunks(COLUMNS).map(Panel::of).collect();
+    let nothing = (0, f32::NEG_INFINITY);
+    let of_some = |(start, some): (usize, &[[f32; FIELD_SIGNATURE]])| {
+        let (mut best, mut back) = (vec![nothing; some.len()], vec![nothing; others.len()]);
+        for (first, rows) in (0..).step_by(ROWS).zip(some.chunks(ROWS)) {
+            let full = std::array::from_fn(|row| &rows[row.min(rows.len() - 1)]);
+            for (panel, column) in panels.iter().zip((0..).step_by(COLUMNS)) {
+                let products = products(set, &full, panel);
+                for (row, products) in products.iter().enumerate().take(rows.len()) {
+                    let of_row = &mut best[first + row];
+                    for (other, &product) in (column..others.len()).zip(products) {
+                        if product > of_row.1 {
+                            *of_row = (other, product);
+                        }
+                        if product > back[other].1 {
+                            back[other] = (start + first + row, product);
+                        }
+                    }
+                }
+            }
+        }
+        [best, back]
+    };
+    let parts: Vec<_> =
+        vectors.par_chunks(TOGETHER).enumerate().map(|(k, some)| of_some((k * TOGETHER, some))).collect();
+    let (mut best, mut back) = (Vec::with_capacity(vectors.len()), vec![nothing; others.len()]);
+    for [of_part, back_of_part] in parts {
+        best.extend(of_part);
+        for (known, found) in back.iter_mut().zip(back_of_part) {
+            if found.1 > known.1 {
+                *known = found;
+            }
+        }
+    }
+    [best, back]
 }
 
 /// T_target_source of a pair of places.
@@ -217,6 +266,19 @@ mod tests {
         let mutual = match_fields(&source, &target, true);
         assert_eq!(mutual.len(), (0..53).filter(|&a| backward[forward[a]] == a).count());
         assert!(mutual.iter().all(|found| backward[found.target] == found.source));
+    }
+
+    #[test]
+    fn the_most_similar_of_both_are_those_of_two_searches() {
+        // More than a thread takes at a time, the last ones again.
+        let (mut source, mut target) = (random_places(TOGETHER + 21, 6), random_places(2 * TOGETHER + 3, 7));
+        source.vectors.extend_from_within(..9);
+        target.vectors.extend_from_within(..9);
+        let expected = [
+            most_similar(&source.vectors, &target.vectors, 1),
+            most_similar(&target.vectors, &source.vectors, 1),
+        ];
+        assert_eq!(most_similar_of_both(&source.vectors, &target.vectors), expected);
     }
 
     #[test]

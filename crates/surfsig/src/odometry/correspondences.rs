@@ -11,26 +11,53 @@ const SLACK: f64 = 0.5;
 /// Points that one thread takes at a time.
 const PART: usize = 1024;
 
-/// For each point of a scan its nearest point of the map, and where the point was when that was looked up.
+/// Where a point was when it was looked up in the map, and what was found there.
 ///
 /// While a point has moved by d since, all others are at least as far as the second nearest was, less d (Greenspan and
 /// Godin, A nearest neighbor method for efficient ICP, 2001). So the result is that of looking up each anew.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LookedUp {
+    at: [f64; 3],
+    nearest: Nearest,
+}
+
+impl Default for LookedUp {
+    /// That of a point that was never looked up.
+    fn default() -> Self {
+        Self { at: [0.0; 3], nearest: Nearest { index: u32::MAX, squared: f64::INFINITY, next: 0.0 } }
+    }
+}
+
+impl LookedUp {
+    /// Number and squared distance of the map's point nearest to where the point is now; it is `None`, or farther than
+    /// the reach, where none is within that.
+    pub fn nearest(&mut self, map: &LocalMap, at: [f64; 3], reach: f64) -> Option<(u32, f64)> {
+        let Self { at: before, nearest } = self;
+        let farthest = nearest.next - squared_distance(&at, before).sqrt();
+        let squared = match nearest.is_some() {
+            true => squared_distance(&at, &map.points()[nearest.index as usize]),
+            false => reach * reach,
+        };
+        let found = if farthest > 0.0 && squared < farthest * farthest {
+            // Others are as far as they were where it was looked up.
+            Nearest { squared, ..*nearest }
+        } else {
+            (*before, *nearest) = (at, map.nearest(at, reach + SLACK));
+            *nearest
+        };
+        found.is_some().then_some((found.index, found.squared))
+    }
+}
+
+/// For each point of a scan its nearest point of the map.
 pub(super) struct Correspondences {
     looked_up: Vec<LookedUp>,
     found: Vec<Option<(u32, f64)>>,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct LookedUp {
-    at: [f64; 3],
-    nearest: Nearest,
-}
-
 impl Correspondences {
     pub fn new(count: usize) -> Self {
-        let nothing = Nearest { index: u32::MAX, squared: f64::INFINITY, next: 0.0 };
-        let looked_up = LookedUp { at: [0.0; 3], nearest: nothing };
-        Self { looked_up: vec![looked_up; count], found: vec![None; count] }
+        Self { looked_up: vec![LookedUp::default(); count], found: vec![None; count] }
     }
 
     /// Number and squared distance of the nearest point of the map within `reach` of each point of a scan.
@@ -41,24 +68,12 @@ impl Correspondences {
         pose: &RigidTransform,
         reach: f64,
     ) -> &[Option<(u32, f64)>] {
-        let of_point = |point: &[f64; 3], LookedUp { at, nearest }: &mut LookedUp| {
-            let moved = pose.transform_point(*point);
-            let farthest = nearest.next - squared_distance(&moved, at).sqrt();
-            let squared = match nearest.is_some() {
-                true => squared_distance(&moved, &map.points()[nearest.index as usize]),
-                false => reach * reach,
-            };
-            if farthest > 0.0 && squared < farthest * farthest {
-                // Others are as far as they were where it was looked up.
-                nearest.squared = squared;
-            } else {
-                (*at, *nearest) = (moved, map.nearest(moved, reach + SLACK));
-            }
-            let is_near = nearest.is_some() && nearest.squared < reach * reach;
-            is_near.then_some((nearest.index, nearest.squared))
+        let of_point = |(point, looked_up): (&[f64; 3], &mut LookedUp)| {
+            let nearest = looked_up.nearest(map, pose.transform_point(*point), reach);
+            nearest.filter(|(_, squared)| *squared < reach * reach)
         };
         let found = points.par_iter().zip(&mut self.looked_up).with_min_len(PART);
-        found.map(|(point, looked_up)| of_point(point, looked_up)).collect_into_vec(&mut self.found);
+        found.map(of_point).collect_into_vec(&mut self.found);
         &self.found
     }
 }

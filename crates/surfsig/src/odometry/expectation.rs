@@ -49,6 +49,11 @@ impl Expectation {
         found.overlap >= self.settings.doubted_overlap * expected && !self.is_contradicted(found)
     }
 
+    /// Overlap of a scan that sees what scans have seen of late, below which it is doubted.
+    pub fn least_overlap(&self) -> f64 {
+        self.settings.doubted_overlap * self.overlap()
+    }
+
     /// Whether scan and map cannot both be, by what either sensor would have measured.
     pub fn is_contradicted(&self, found: &ScanAlignment) -> bool {
         // A few points may be anything, and of few points they are a large share.

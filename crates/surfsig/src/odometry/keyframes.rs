@@ -1,7 +1,10 @@
 //! Scans that are kept, to find a sensor again that was lost.
 
+mod panorama;
 mod ranges;
 mod search;
+
+pub(super) use search::By;
 
 use super::local_map::LocalMap;
 use super::settings::OdometrySettings;
@@ -10,6 +13,7 @@ use super::tracker::rotation_angle;
 use super::voxel_index::squared_distance;
 use crate::visibility::SphericalRangeImage;
 use crate::{FieldPlaces, RigidTransform};
+use panorama::Panorama;
 use ranges::Ranges;
 use std::collections::{BTreeSet, VecDeque};
 
@@ -24,6 +28,7 @@ struct Keyframe {
     detail: Vec<[f32; 3]>,
     range_image: SphericalRangeImage,
     ranges: Ranges,
+    panorama: Panorama,
     /// Its keypoints, once they have been asked for.
     described: Option<FieldPlaces>,
     /// Whether the present map has what it saw.
@@ -78,6 +83,7 @@ impl Keyframes {
             detail: in_float32(&scan.means(settings.detail_voxel)),
             range_image: scan.range_image.clone(),
             ranges: Ranges::new(scan.coarse.points()),
+            panorama: Panorama::new(scan.coarse.points()),
             described: None,
             is_loaded: true,
         });
@@ -184,6 +190,20 @@ impl Keyframes {
         pose: &RigidTransform,
         which: Which,
     ) -> impl Fn([f64; 3]) -> bool + use<'_> {
+        let observers: Vec<(RigidTransform, &SphericalRangeImage)> = self
+            .next_to(pose, which)
+            .into_iter()
+            .map(|other| (other.T_map_scan.inverse() * *pose, &other.range_image))
+            .collect();
+        move |point| {
+            observers
+                .iter()
+                .any(|(transform, image)| image.visibility(transform.transform_point(point)).is_in_sight())
+        }
+    }
+
+    /// Those next to a pose, the nearest first: as many as tell what is in sight there.
+    fn next_to(&self, pose: &RigidTransform, which: Which) -> Vec<&Keyframe> {
         let distance = |other: &Keyframe| (other.T_map_scan.translation - pose.translation).norm();
         let is_asked = |keyframe: &&Keyframe| match which {
             Which::Loaded => keyframe.is_loaded,
@@ -193,13 +213,18 @@ impl Keyframes {
         let mut near: Vec<&Keyframe> = self.kept.iter().filter(is_asked).collect();
         near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
         near.truncate(self.settings.relocalisation.observers);
-        let observers: Vec<(RigidTransform, &SphericalRangeImage)> =
-            near.iter().map(|other| (other.T_map_scan.inverse() * *pose, &other.range_image)).collect();
-        move |point| {
-            observers
-                .iter()
-                .any(|(transform, image)| image.visibility(transform.transform_point(point)).is_in_sight())
-        }
+        near
+    }
+
+    /// The number of the one next to a pose, and its pose.
+    pub fn nearest_to(&self, pose: &RigidTransform) -> Option<(usize, RigidTransform)> {
+        let nearest = self.next_to(pose, Which::All).into_iter().next()?;
+        Some((nearest.number as usize, nearest.T_map_scan))
+    }
+
+    /// The map of those next to a pose: enough to tell the likeliest of several.
+    fn map_next_to(&self, pose: &RigidTransform) -> LocalMap {
+        self.map_with(self.next_to(pose, Which::All))
     }
 
     /// Takes out those of scans whose poses were wrong.
@@ -209,15 +234,22 @@ impl Keyframes {
 
     /// The map of some of the keyframes taken within a distance of a point.
     fn map_of(&self, center: [f64; 3], distance: f64, is_in: impl Fn(&Keyframe) -> bool) -> LocalMap {
-        let mut map = LocalMap::new(&self.settings.map);
-        for keyframe in self.kept.iter().filter(|keyframe| is_in(keyframe)) {
+        let is_near = |keyframe: &&Keyframe| {
             let from: [f64; 3] = keyframe.T_map_scan.translation.into();
-            if squared_distance(&from, &center) <= distance * distance {
-                let moved = |point: &[f32; 3]| keyframe.T_map_scan.transform_point(point.map(f64::from));
-                map.add(keyframe.points.iter().map(moved), keyframe.number);
-            }
-        }
+            squared_distance(&from, &center) <= distance * distance
+        };
+        let asked = self.kept.iter().filter(|keyframe| is_in(keyframe));
+        let mut map = self.map_with(asked.filter(is_near));
         map.keep_within(center, distance);
+        map
+    }
+
+    fn map_with<'a>(&self, keyframes: impl IntoIterator<Item = &'a Keyframe>) -> LocalMap {
+        let mut map = LocalMap::new(&self.settings.map);
+        for keyframe in keyframes {
+            let moved = |point: &[f32; 3]| keyframe.T_map_scan.transform_point(point.map(f64::from));
+            map.add(keyframe.points.iter().map(moved), keyframe.number);
+        }
         map
     }
 }

@@ -1,5 +1,6 @@
 //! The sensor's surroundings, as earlier scans have seen them; lengths are in voxels.
 
+use super::correspondences::LookedUp;
 use super::settings::MapSettings;
 use super::voxel_index::{Nearest, VoxelIndex, squared_distance};
 use crate::RigidTransform;
@@ -201,9 +202,16 @@ impl LocalMap {
 }
 
 impl GicpTarget for LocalMap {
+    type Memory = LookedUp;
+
     fn nearest(&self, at: [f64; 3], reach: f64) -> Option<u32> {
         let found = self.nearest(at, reach);
         found.is_some().then_some(found.index)
+    }
+
+    fn nearest_again(&self, at: [f64; 3], reach: f64, memory: &mut LookedUp) -> Option<u32> {
+        let found = memory.nearest(self, at, reach);
+        found.filter(|(_, squared)| *squared <= reach * reach).map(|(number, _)| number)
     }
 
     fn surface(&self, number: u32) -> ([f64; 3], [f64; 3]) {

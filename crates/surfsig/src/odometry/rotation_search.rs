@@ -8,13 +8,13 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// The rotations of a scan about its sensor, at a pose, by which most of its points come near the map: the best first,
-/// each the best one of those next to it.
+/// each the best one of those next to it, with how many of some points that are.
 pub(super) fn rotations_on_map(
     points: &[[f64; 3]],
     map: &LocalMap,
     around: &RigidTransform,
     settings: &RelocalisationSettings,
-) -> Vec<RigidTransform> {
+) -> Vec<(usize, RigidTransform)> {
     let some = some_points(points, settings.rotation_points);
     let steps = (2.0 * PI / settings.rotation_step).floor().max(1.0) as usize;
     // About each axis from no rotation to a whole one.
@@ -45,7 +45,8 @@ pub(super) fn rotations_on_map(
     let mut peaks: Vec<&(usize, RigidTransform)> =
         tried.iter().filter(|(number, _)| is_peak(*number)).collect();
     peaks.sort_by_key(|(number, _)| std::cmp::Reverse(counts[*number]));
-    peaks.into_iter().take(settings.rotation_trials).map(|(_, pose)| *pose).collect()
+    let chosen = peaks.into_iter().take(settings.rotation_trials);
+    chosen.map(|(number, pose)| (counts[*number], *pose)).collect()
 }
 
 /// Some of a scan's points, by which poses are compared.
@@ -84,7 +85,7 @@ mod tests {
             let truth = at * RigidTransform::from_rotation_vector([0.0, 0.0, angle.to_radians()], [0.0; 3]);
             let scan = truth.inverse().transform_points(&room);
             let found = rotations_on_map(&scan, &map, &at, &RelocalisationSettings::default());
-            let off = (truth.inverse() * found[0]).log();
+            let off = (truth.inverse() * found[0].1).log();
             let angle_off = (off[0] * off[0] + off[1] * off[1] + off[2] * off[2]).sqrt();
             assert!(angle_off.to_degrees() < 5.0, "{angle}: {}", angle_off.to_degrees());
         }

@@ -7,9 +7,9 @@ use super::settings::ScanAlignmentSettings;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
 use crate::alignment::{
-    FreeDirection, GicpSettings, HeldLimits, IndependentNormals, Motions, PlaceNormals, UNOBSERVABLE, blocks,
-    clustered_covariance, gicp_with, halves, lengths, orthonormal, solve_determined, systematic_covariance,
-    unscaled,
+    FreeDirection, GicpCloud, GicpSettings, HeldLimits, IndependentNormals, Motions, PlaceNormals,
+    UNOBSERVABLE, blocks, clustered_covariance, gicp_with, halves, lengths, orthonormal, solve_determined,
+    systematic_covariance, unscaled,
 };
 use crate::random::some_of;
 use crate::statistics::{DEVIATIONS_PER_MEDIAN, median};
@@ -67,34 +67,38 @@ impl ScanAlignment {
     }
 }
 
+/// Where an alignment starts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Start {
+    pub pose: RigidTransform,
+    /// Between corresponding points, in the first round.
+    pub max_distance: f64,
+    /// Whether nothing is known of the motion to it: few points may then lead astray, and the first round takes all.
+    pub is_guess: bool,
+}
+
+impl Start {
+    /// A start that a motion or a search has led to.
+    pub fn near(pose: RigidTransform, max_distance: f64) -> Self {
+        Self { pose, max_distance, is_guess: false }
+    }
+}
+
 /// Aligns a scan from a pose nearby; `None` where it hardly meets the map. Along motions that the map does not determine
 /// the pose stays where it started.
 ///
-/// `max_distance` is between corresponding points, in the first round; `would_be_known` tells by the scan's pose which
-/// of its points earlier scans would have measured.
+/// `would_be_known` tells by the scan's pose which of its points earlier scans would have measured.
 pub(super) fn align<F: Fn([f64; 3]) -> bool>(
     scan: &ThinnedScan,
     map: &LocalMap,
-    start: RigidTransform,
-    max_distance: f64,
+    start: Start,
     settings: &ScanAlignmentSettings,
     would_be_known: impl FnOnce(&RigidTransform) -> F,
 ) -> Option<ScanAlignment> {
-    let mut pose = start;
-    for max_correspondence_distance in [max_distance, max_distance.min(settings.max_point_distance)] {
-        let &ScanAlignmentSettings { max_iterations, rotation_epsilon, translation_epsilon, .. } = settings;
-        let round = GicpSettings {
-            max_correspondence_distance,
-            max_iterations,
-            rotation_epsilon,
-            translation_epsilon,
-        };
-        let found = gicp_with(map, &scan.coarse, pose, &round);
-        if found.inliers < settings.min_correspondences {
-            return None;
-        }
-        pose = found.T_target_source;
-    }
+    let Start { pose: start, max_distance, is_guess } = start;
+    let first = if is_guess { &scan.coarse } else { &scan.few };
+    let mut pose = gicp_round(first, map, start, max_distance, settings)?;
+    pose = gicp_round(&scan.coarse, map, pose, max_distance.min(settings.max_point_distance), settings)?;
     let mut correspondences = Correspondences::new(scan.points.len());
     for _ in 0..settings.plane_steps {
         let plane = PointToPlane::new(&scan.points, map, &pose, &mut correspondences, settings)?;
@@ -149,6 +153,34 @@ pub(super) fn align<F: Fn([f64; 3]) -> bool>(
         scans: plane.shares_of_scans(map),
         within,
     })
+}
+
+/// The first round of [`align`], with some of the scan's points: near enough for the second one.
+pub(super) fn align_roughly(
+    scan: &ThinnedScan,
+    map: &LocalMap,
+    start: RigidTransform,
+    max_distance: f64,
+    settings: &ScanAlignmentSettings,
+) -> Option<RigidTransform> {
+    gicp_round(&scan.few, map, start, max_distance, settings)
+}
+
+fn gicp_round(
+    points: &GicpCloud,
+    map: &LocalMap,
+    start: RigidTransform,
+    max_distance: f64,
+    settings: &ScanAlignmentSettings,
+) -> Option<RigidTransform> {
+    let round = GicpSettings {
+        max_correspondence_distance: max_distance,
+        max_iterations: settings.max_iterations,
+        rotation_epsilon: settings.rotation_epsilon,
+        translation_epsilon: settings.translation_epsilon,
+    };
+    let found = gicp_with(map, points, start, &round);
+    (found.inliers >= settings.min_correspondences).then_some(found.T_target_source)
 }
 
 /// Refines pose and motion within the scan at once: the twist, and where the points then are.

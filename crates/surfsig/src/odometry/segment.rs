@@ -106,6 +106,15 @@ impl Segment {
         (self.T_world_map * pose, step.covariance.scaled(self.scale.voxel).and(&of_map))
     }
 
+    /// The scan of the keyframe next to a pose in the world, and its pose there, about its sensor.
+    pub fn keyframe_next_to(&self, pose: &RigidTransform) -> Option<(usize, RigidTransform)> {
+        let mut in_map = self.T_world_map.inverse() * *pose;
+        in_map.translation /= self.scale.voxel;
+        let (number, mut of_keyframe) = self.tracker.keyframe_next_to(&in_map)?;
+        of_keyframe.translation *= self.scale.voxel;
+        Some((self.first + number, self.T_world_map * of_keyframe))
+    }
+
     /// The loops that the last scan has closed.
     pub fn take_loops(&mut self) -> Vec<FoundLoop> {
         let in_unit = |mut transform: RigidTransform| {

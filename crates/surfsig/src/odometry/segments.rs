@@ -122,8 +122,12 @@ impl Segments {
         };
         if let Some((index, found)) = search_past(past, &measured, searched, &self.settings) {
             self.lost = 0;
-            followed.found = found;
             followed.is_thin = false;
+            if let Some((around, closed)) = self.closed_around(index, &measured, &found) {
+                followed.found = around;
+                followed.loops.push(closed);
+            }
+            followed.found.extend(found);
             let segment = self.segments.remove(index);
             self.leave_present();
             self.segments.push(segment);
@@ -144,6 +148,35 @@ impl Segments {
             self.remember(number, measured, step);
         }
         followed
+    }
+
+    /// The loop that a scan closes which is found in a past map, where a map on trial leads around to it from the last scan
+    /// that had a pose; and the poses of the scans between.
+    #[allow(non_snake_case)]
+    fn closed_around(
+        &mut self,
+        index: usize,
+        measured: &MeasuredScan,
+        found: &[FoundPose],
+    ) -> Option<(Vec<FoundPose>, FoundLoop)> {
+        let Candidate { mut segment, mut steps } = self.candidate.take()?;
+        let (past, present) = (self.segments.get(index)?, self.segments.last()?);
+        let first = found.first().filter(|first| first.segment == present.number)?;
+        let scan = segment.thinned(measured, &self.settings)?;
+        steps.extend(segment.follow(Some(&scan)));
+        let (T_world_map, covariance) = self.in_present_world(&segment)?;
+        (segment.number, segment.origin) = (present.number, present.origin);
+        (segment.T_world_map, segment.covariance) = (T_world_map, covariance);
+        let at_first = steps.iter().position(|step| segment.first + step.number == first.scan)?;
+        let (earlier, T_world_earlier) = past.keyframe_next_to(&first.T_world_sensor)?;
+        let closed = FoundLoop {
+            scan: first.scan,
+            earlier,
+            origin: segment.origin,
+            T_earlier_scan: T_world_earlier.inverse() * first.T_world_sensor,
+            T_world_scan_before: segment.in_world(&steps[at_first]).0,
+        };
+        Some((steps[..at_first].iter().map(|step| segment.found(step)).collect(), closed))
     }
 
     /// The present map becomes one of the past, in which only a search finds the sensor again.
@@ -203,12 +236,11 @@ impl Segments {
     /// Puts the map on trial in the present one's place, in the same world where the scan before lies in it.
     fn go_on_in_another_map(&mut self, followed: &mut Followed) {
         let Some(Candidate { mut segment, steps }) = self.candidate.take() else { return };
-        if let (Some(anchor), Some(present)) = (&self.anchor, self.segments.last())
-            && let Some((transform, covariance)) = self.joined(anchor, &segment)
+        if let (Some(present), Some((pose, covariance))) =
+            (self.segments.last(), self.in_present_world(&segment))
         {
             (segment.number, segment.origin) = (present.number, present.origin);
-            segment.T_world_map = anchor.T_world_sensor * transform.inverse();
-            segment.covariance = covariance;
+            (segment.T_world_map, segment.covariance) = (pose, covariance);
         } else {
             self.worlds += 1;
         }
@@ -216,6 +248,14 @@ impl Segments {
         followed.is_thin = false;
         self.leave_present();
         self.segments.push(segment);
+    }
+
+    /// The pose of another map in the present one's world, and what it is off by, where the last scan with a pose lies in
+    /// it.
+    fn in_present_world(&self, segment: &Segment) -> Option<(RigidTransform, Covariance)> {
+        let anchor = self.anchor.as_ref()?;
+        let (transform, covariance) = self.joined(anchor, segment)?;
+        Some((anchor.T_world_sensor * transform.inverse(), covariance))
     }
 
     /// The pose of the scan before in another map, in the scans' unit, and what the map's pose in the world is off by.
@@ -302,12 +342,18 @@ enum Turn {
 }
 
 fn turn_to_search(past: &[Segment], present: &Segment, lost: usize) -> Turn {
-    if present.tracker.is_on_trial() {
+    let on_trial: Vec<bool> = past.iter().map(|segment| segment.tracker.is_on_trial()).collect();
+    turn_of(&on_trial, present.tracker.is_on_trial(), lost)
+}
+
+/// A trial goes on with the next scan; otherwise it is another map's turn, the latest first.
+fn turn_of(past_on_trial: &[bool], is_present_on_trial: bool, lost: usize) -> Turn {
+    if is_present_on_trial {
         return Turn::Present;
     }
-    // A trial goes on with the next scan; otherwise it is another map's turn, the latest first.
-    let on_trial = past.iter().position(|segment| segment.tracker.is_on_trial());
-    let by_turns = (lost % (past.len() + 1)).checked_sub(1).map(|turn| past.len() - 1 - turn);
+    let on_trial = past_on_trial.iter().position(|is_on_trial| *is_on_trial);
+    let count = past_on_trial.len();
+    let by_turns = (lost % (count + 1)).checked_sub(1).map(|turn| count - 1 - turn);
     on_trial.or(by_turns).map_or(Turn::Present, Turn::Past)
 }
 
@@ -326,4 +372,18 @@ fn search_past(
     let scan = segment.thinned(measured, settings);
     let steps = segment.follow(scan.as_ref());
     (!steps.is_empty()).then(|| (chosen, steps.iter().map(|step| segment.found(step)).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_are_searched_by_turns_but_for_one_on_trial() {
+        let turns: Vec<Turn> = (0..5).map(|lost| turn_of(&[false; 3], false, lost)).collect();
+        assert_eq!(turns, [Turn::Present, Turn::Past(2), Turn::Past(1), Turn::Past(0), Turn::Present]);
+        assert!((0..5).all(|lost| turn_of(&[], false, lost) == Turn::Present));
+        assert!((0..5).all(|lost| turn_of(&[false, true, false], false, lost) == Turn::Past(1)));
+        assert!((0..5).all(|lost| turn_of(&[false, true, false], true, lost) == Turn::Present));
+    }
 }

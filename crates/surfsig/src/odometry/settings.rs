@@ -122,6 +122,9 @@ pub struct ScanAlignmentSettings {
     /// Edge, in voxels, of the coarser voxels of which GICP takes a scan's points: it only has to find the basin of
     /// the steps point to plane, which take all of them.
     pub coarse_voxel: f64,
+    /// Points of these voxels that the first round takes, at most: it only has to come near enough for the second one.
+    /// About a third of those of a scan; searches try their starts with them.
+    pub first_points: usize,
     /// Steps point to plane: each squares the error that is left.
     pub plane_steps: usize,
     /// Largest distance between corresponding points in the second round and point to plane, in voxels: the diagonal
@@ -166,6 +169,7 @@ impl Default for ScanAlignmentSettings {
             rotation_epsilon: 1e-3,
             translation_epsilon: 1e-2,
             coarse_voxel: 1.5,
+            first_points: 600,
             plane_steps: 2,
             max_point_distance: 2.0,
             max_residual: 0.5,

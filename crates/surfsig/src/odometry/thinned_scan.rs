@@ -22,6 +22,8 @@ pub(super) struct ThinnedScan {
     pub points: Vec<[f64; 3]>,
     /// What GICP takes: the means of coarser voxels.
     pub coarse: GicpCloud,
+    /// Some of these, for the first round.
+    pub few: GicpCloud,
     /// How far the sensor saw.
     pub range_image: SphericalRangeImage,
     /// With the mean time of each voxel's points, where these are known.
@@ -51,8 +53,9 @@ impl ThinnedScan {
     ) -> Self {
         let points = voxel_means(&measured, 1.0);
         let coarse = GicpCloud::new(voxel_means(&points, settings.alignment.coarse_voxel));
+        let few = coarse.sample(settings.alignment.first_points);
         let range_image = SphericalRangeImage::new(&points, settings.range_image);
-        Self { measured, points, coarse, range_image, motion, raw }
+        Self { measured, points, coarse, few, range_image, motion, raw }
     }
 
     /// The same scan with another motion within; `None` where no times are known.

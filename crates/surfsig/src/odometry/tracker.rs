@@ -14,7 +14,7 @@ use super::local_map::LocalMap;
 use super::pose_covariance::Covariance;
 use super::result::ScanStatus;
 use super::scale::{Scale, distances};
-use super::scan_alignment::{ScanAlignment, align};
+use super::scan_alignment::{ScanAlignment, Start, align};
 use super::settings::OdometrySettings;
 use super::thinned_scan::ThinnedScan;
 use crate::RigidTransform;
@@ -81,6 +81,8 @@ pub(super) struct Tracker {
     first: Option<ThinnedScan>,
     /// Scans since the last search.
     since_search: usize,
+    /// Searches among keyframes so far, since the sensor was found last.
+    searches: usize,
     /// Whether it is this map's turn to search its keyframes.
     searches_keyframes: bool,
     /// Numbers of the scans up to the last one whose poses were kept though doubted.
@@ -121,6 +123,7 @@ impl Tracker {
             last_mapped: None,
             first: None,
             since_search: usize::MAX,
+            searches: 0,
             searches_keyframes: true,
             doubted: Vec::new(),
             disproved: Vec::new(),
@@ -149,7 +152,8 @@ impl Tracker {
     pub fn leave(&mut self) {
         self.trial.clear();
         self.is_lost = true;
-        self.since = self.settings.prediction.max_lost;
+        self.since = self.settings.prediction.max_lost + 1;
+        self.motion = RigidTransform::identity();
     }
 
     /// Where the next scan is expected, in the map.
@@ -199,7 +203,7 @@ impl Tracker {
         }
         self.since_search = self.since_search.saturating_add(1);
         let mut prediction = self.prediction();
-        let first = self.aligned(scan, prediction);
+        let first = if self.may_be_at(scan, &prediction) { self.aligned(scan, prediction) } else { None };
         let mut first = first.and_then(|found| self.deskew_first(scan, found));
         if !first.as_ref().is_some_and(|found| self.is_met(found))
             && let Some((start, found)) = self.by_other_motion(scan, first.as_ref())
@@ -208,7 +212,10 @@ impl Tracker {
             first = Some(found);
         }
         let chosen = match first {
-            Some(found) if self.is_met(&found) => Some((found, ScanStatus::Tracked)),
+            Some(found) if self.is_met(&found) => {
+                self.searches = 0;
+                Some((found, ScanStatus::Tracked))
+            }
             doubted => self.found_elsewhere_or_doubted(scan, doubted, &prediction),
         };
         let Some((mut found, status)) = chosen.filter(|(found, _)| self.is_believable(found)) else {
@@ -287,17 +294,14 @@ impl Tracker {
     }
 
     fn aligned(&self, scan: &ThinnedScan, start: RigidTransform) -> Option<ScanAlignment> {
-        self.aligned_within(scan, start, self.correspondence_distance())
+        let max_distance = self.correspondence_distance();
+        let is_guess = !self.has_motion && !self.is_lost;
+        self.aligned_from(scan, Start { pose: start, max_distance, is_guess })
     }
 
-    fn aligned_within(
-        &self,
-        scan: &ThinnedScan,
-        start: RigidTransform,
-        distance: f64,
-    ) -> Option<ScanAlignment> {
+    fn aligned_from(&self, scan: &ThinnedScan, start: Start) -> Option<ScanAlignment> {
         let known = |pose: &RigidTransform| self.keyframes.would_have_seen(pose, Which::Loaded);
-        align(scan, &self.map, start, distance, &self.settings.alignment, known)
+        align(scan, &self.map, start, &self.settings.alignment, known)
     }
 
     /// As far as predictions were wrong (KISS-ICP's threshold, Vizzo and others, 2023).
@@ -316,7 +320,7 @@ impl Tracker {
 
     /// How far a motion carries a point at the median range, at most.
     fn distance_at_range(&self, motion: &RigidTransform) -> f64 {
-        2.0 * self.median_range * (0.5 * rotation_angle(motion)).sin() + motion.translation.norm()
+        distance_at_range(self.median_range, motion)
     }
 
     /// Whether a doubted pose may be kept: it is near where the sensor was expected, which long after it was lost is
@@ -373,6 +377,11 @@ impl Tracker {
 /// The motion of several steps.
 fn power(motion: RigidTransform, steps: usize) -> RigidTransform {
     RigidTransform::exp(motion.log().map(|component| component * steps as f64))
+}
+
+/// How far a motion carries a point at a range, at most.
+pub(super) fn distance_at_range(range: f64, motion: &RigidTransform) -> f64 {
+    2.0 * range * (0.5 * rotation_angle(motion)).sin() + motion.translation.norm()
 }
 
 /// The angle of a motion's rotation, 0 to pi.

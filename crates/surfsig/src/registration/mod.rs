@@ -300,8 +300,8 @@ fn described(
 ) -> Result<FieldPlaces, Error> {
     let keypoints = KeypointOptions {
         count: settings.keypoints,
-        spacing: None,
         candidates_per_radius: settings.candidates_per_radius,
+        ..KeypointOptions::default()
     };
     let own = scan.scan();
     let options = match directions {

@@ -51,8 +51,11 @@ pub struct RelocalisationSettings {
     /// a lidar to (seeds 601 and 602), all were found with 800, and seven with 400.
     pub keypoints: usize,
     /// Voxels along the radius of a keypoint's patch, of which each gives one candidate. With 4 as many of these places
-    /// were found as with 8, and to describe a scan took half of the time.
+    /// were found as with 8, in half of the time; with 3, which takes half of that again, those of seeds 601 to 606 are.
     pub candidates_per_radius: f64,
+    /// Candidates that each is compared with to tell how distinctive it is, at most: with all of them that took half of
+    /// the time of a description (a profile of `benchmarks/odometry.py`).
+    pub compared: usize,
     /// Keyframes that are kept, at most: each takes some 300 kB.
     pub max_kept: usize,
     /// Scans after which a keyframe that is not in the map any more may be one that the sensor comes back to.
@@ -82,8 +85,18 @@ pub struct RelocalisationSettings {
     pub clear_gain: f64,
     /// Such rotations from which the scan is aligned, at most, the best first.
     pub rotation_trials: usize,
+    /// Share of these points that come near the map from which on a rotation is tried where keyframes are searched, too,
+    /// and any other motion is aligned with all points. Right rotations brought 0.33 to 0.96 of them near before they were
+    /// aligned, wrong ones up to 0.45 (`benchmarks/hard_sequences.py`, `loops.py` and `odometry.py`).
+    pub likely_share: f64,
     /// Matches that agree with a pose that is tried, at least.
     pub min_matches: usize,
+    /// Matches that agree with a pose, at least, where it was found by how far the scan sees all around. Right poses had 57
+    /// to 195 of them, and wrong ones 26 to 67 (`benchmarks/odometry.py`, seeds 601 to 606, and `loops.py`).
+    pub confirming_matches: usize,
+    /// Distance at the median range between such a pose and that which the matches propose, at most, in voxels: that of
+    /// right poses was 0.1 to 1.0, and of wrong ones 1.2 to 9.5.
+    pub confirming_distance: f64,
     /// Poses that are tried on the keyframes' map, at most, those that most matches agree with: the one by which most
     /// points come near the map is aligned.
     pub max_trials: usize,
@@ -110,10 +123,11 @@ impl Default for RelocalisationSettings {
             keyframe_distance: 0.3,
             keyframe_rotation: 30.0_f64.to_radians(),
             max_keyframes: 16,
-            max_described: 4,
+            max_described: 2,
             max_descriptions: 64,
             keypoints: 800,
-            candidates_per_radius: 4.0,
+            candidates_per_radius: 3.0,
+            compared: 500,
             max_kept: 400,
             scans_apart: 30,
             loop_distance: 0.6,
@@ -127,7 +141,10 @@ impl Default for RelocalisationSettings {
             rotation_distance: 1.5,
             clear_gain: 0.1,
             rotation_trials: 2,
+            likely_share: 0.5,
             min_matches: 16,
+            confirming_matches: 32,
+            confirming_distance: 1.0,
             max_trials: 3,
             detail_voxel: 0.5,
             observers: 4,

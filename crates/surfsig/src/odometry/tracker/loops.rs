@@ -3,7 +3,7 @@
 
 use super::super::keyframes::Which;
 use super::super::local_map::LocalMap;
-use super::super::scan_alignment::{ScanAlignment, align};
+use super::super::scan_alignment::{ScanAlignment, Start, align};
 use super::super::thinned_scan::ThinnedScan;
 use super::super::translation_search::translations_on_map;
 use super::Tracker;
@@ -26,6 +26,11 @@ impl Tracker {
     /// Whether a scan of a later map may lie on this one's keyframes of scans before one.
     pub fn has_keyframe_near(&self, expected: &RigidTransform, before: usize) -> bool {
         self.keyframes.has_earlier_near(expected, before)
+    }
+
+    /// The number of the keyframe next to a pose, and its pose.
+    pub fn keyframe_next_to(&self, pose: &RigidTransform) -> Option<(usize, RigidTransform)> {
+        self.keyframes.nearest_to(pose)
     }
 
     /// Where a scan of a later map lies on the keyframes of this one, which the sensor has left: the pose of that scan, and
@@ -52,9 +57,11 @@ impl Tracker {
         let settings = &self.settings.relocalisation;
         let known = |pose: &RigidTransform| self.keyframes.would_have_seen(pose, which);
         let distance = settings.max_correspondence_distance;
-        translations_on_map(scan.coarse.points(), map, expected, settings)
+        let starts = translations_on_map(scan.coarse.points(), map, expected, settings);
+        self.trials(distance)
+            .likeliest(scan, map, starts, 0)
             .into_iter()
-            .filter_map(|start| align(scan, map, start, distance, &self.settings.alignment, known))
+            .filter_map(|pose| align(scan, map, Start::near(pose, distance), &self.settings.alignment, known))
             .filter(|there| there.free_directions.is_empty() && self.is_met(there))
             .max_by(|a, b| a.overlap.total_cmp(&b.overlap))
     }

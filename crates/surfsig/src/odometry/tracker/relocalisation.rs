@@ -1,14 +1,28 @@
 //! Where the sensor is, if not where it is expected: moved otherwise, rotated, or carried to another keyframe.
 
+use super::super::keyframes::By;
 use super::super::local_map::LocalMap;
 use super::super::result::ScanStatus;
 use super::super::rotation_search::{points_near, rotations_on_map, some_points};
-use super::super::scan_alignment::ScanAlignment;
+use super::super::rough_alignment::Trials;
+use super::super::scan_alignment::{ScanAlignment, Start};
 use super::super::thinned_scan::ThinnedScan;
 use super::Tracker;
 use crate::RigidTransform;
 
 impl Tracker {
+    /// Whether a scan is aligned from where it is expected: long after the sensor was lost only where it lies on the map
+    /// there, as it does where something that hid the surroundings has left.
+    pub(super) fn may_be_at(&self, scan: &ThinnedScan, expected: &RigidTransform) -> bool {
+        if self.since <= self.settings.prediction.max_lost {
+            return true;
+        }
+        let settings = &self.settings.relocalisation;
+        let some = some_points(scan.coarse.points(), settings.rotation_points);
+        let near = points_near(&some, &self.map, expected, settings.rotation_distance);
+        near as f64 >= self.expectation.least_overlap() * some.len() as f64
+    }
+
     /// The pose found by rotations of the sensor or among keyframes, or else the doubted one where it
     /// may be kept.
     pub(super) fn found_elsewhere_or_doubted(
@@ -21,11 +35,14 @@ impl Tracker {
         // A search costs several scans, and changes next to nothing where a pose is only doubted.
         if kept.is_none() || self.since_search >= self.settings.relocalisation.scans_between {
             self.since_search = 0;
-            if let Some(found) = self.by_rotation(scan, doubted.as_ref()) {
+            let by = self.searches_keyframes.then(|| self.next_search());
+            if let Some(found) = self.by_rotation(scan, doubted.as_ref(), by.is_some() || self.since > 1) {
                 self.begin_trial_at(&found);
                 return Some((found, ScanStatus::Relocalised));
             }
-            if let Some((found, map)) = self.among_keyframes(scan, doubted.as_ref()) {
+            if let Some(by) = by
+                && let Some((found, map)) = self.among_keyframes(scan, doubted.as_ref(), by)
+            {
                 self.begin_trial_at(&found);
                 self.map = map;
                 return Some((found, ScanStatus::Relocalised));
@@ -58,25 +75,50 @@ impl Tracker {
             .map(|start| (start, near(&start)))
             .filter(|(_, count)| *count > least)
             .max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let found = self.aligned(scan, start)?;
+        let least = self.least_near(scan, doubted);
+        let pose = *self
+            .trials(self.correspondence_distance())
+            .likeliest(scan, &self.map, [start], least)
+            .first()?;
+        let found = self.aligned(scan, pose)?;
         let is_chosen =
             found.free_directions.is_empty() && self.is_met(&found) && self.is_better(&found, doubted);
         is_chosen.then_some((start, found))
     }
 
-    /// From where the sensor is expected, rotated about itself.
-    fn by_rotation(&self, scan: &ThinnedScan, doubted: Option<&ScanAlignment>) -> Option<ScanAlignment> {
+    /// How a scan is searched among keyframes: both kinds take turns, so that each scan costs a few tracked ones.
+    fn next_search(&mut self) -> By {
+        self.searches += 1;
+        if self.searches.is_multiple_of(2) { By::Signatures } else { By::Panorama }
+    }
+
+    /// From where the sensor is expected, rotated about itself; with `only_likely` only if a rotation alone brings most of
+    /// the points near the map.
+    fn by_rotation(
+        &self,
+        scan: &ThinnedScan,
+        doubted: Option<&ScanAlignment>,
+        only_likely: bool,
+    ) -> Option<ScanAlignment> {
         let settings = &self.settings.relocalisation;
         if self.since > self.settings.prediction.max_lost {
             return None;
         }
         let mut around = self.prediction();
         around.rotation = self.last.rotation;
-        let starts = rotations_on_map(scan.coarse.points(), &self.map, &around, settings);
+        let points = scan.coarse.points();
+        let rotations = rotations_on_map(points, &self.map, &around, settings);
+        let likely = settings.likely_share * points.len().min(settings.rotation_points) as f64;
+        if only_likely && rotations.first().is_none_or(|(near, _)| (*near as f64) < likely) {
+            return None;
+        }
+        let starts = rotations.into_iter().map(|(_, pose)| pose);
         let distance = settings.max_correspondence_distance.max(self.correspondence_distance());
-        let found: Vec<ScanAlignment> = starts
+        let found: Vec<ScanAlignment> = self
+            .trials(distance)
+            .likeliest(scan, &self.map, starts, self.least_near(scan, doubted))
             .into_iter()
-            .filter_map(|start| self.aligned_within(scan, start, distance))
+            .filter_map(|pose| self.aligned_from(scan, Start::near(pose, distance)))
             .filter(|found| {
                 found.free_directions.is_empty() && self.is_met(found) && self.is_better(found, doubted)
             })
@@ -94,17 +136,15 @@ impl Tracker {
         &mut self,
         scan: &ThinnedScan,
         doubted: Option<&ScanAlignment>,
+        by: By,
     ) -> Option<(ScanAlignment, LocalMap)> {
-        if !self.searches_keyframes {
-            return None;
-        }
         let (expectation, median_range) = (&self.expectation, self.median_range);
         let is_met = |found: &ScanAlignment| {
             found.free_directions.is_empty()
                 && expectation.is_met(found)
                 && expectation.is_believable(found, median_range)
         };
-        let searched = self.keyframes.find(scan, &self.last, self.map_range, is_met);
+        let searched = self.keyframes.find(scan, &self.last, self.map_range, by, is_met);
         searched.filter(|(found, _)| self.is_better(found, doubted))
     }
 
@@ -126,12 +166,29 @@ impl Tracker {
         let rotated = starts
             .first()
             .into_iter()
-            .flat_map(|around| rotations_on_map(scan.coarse.points(), &self.map, around, settings));
-        let found = starts.iter().copied().chain(rotated);
+            .flat_map(|around| rotations_on_map(scan.coarse.points(), &self.map, around, settings))
+            .map(|(_, pose)| pose);
+        let starts = starts.iter().copied().chain(rotated);
+        let found = self.trials(distance).likeliest(scan, &self.map, starts, 0).into_iter();
         found
-            .filter_map(|start| self.aligned_within(scan, start, distance))
+            .filter_map(|pose| self.aligned_from(scan, Start::near(pose, distance)))
             .filter(|found| found.free_directions.is_empty() && self.is_met(found))
             .max_by(|a, b| a.overlap.total_cmp(&b.overlap))
+    }
+
+    pub(super) fn trials(&self, distance: f64) -> Trials<'_> {
+        Trials { settings: &self.settings, distance, range: self.median_range }
+    }
+
+    /// How many of some of a scan's points a pose that was searched has to bring near the map: most of them, and as many
+    /// as the doubted pose does.
+    fn least_near(&self, scan: &ThinnedScan, doubted: Option<&ScanAlignment>) -> usize {
+        let settings = &self.settings.relocalisation;
+        let some = some_points(scan.coarse.points(), settings.rotation_points);
+        let doubted = doubted.filter(|doubted| doubted.free_directions.is_empty());
+        let by_doubted = doubted
+            .map_or(0, |found| points_near(&some, &self.map, &found.T_map_scan, settings.rotation_distance));
+        by_doubted.max((settings.likely_share * some.len() as f64).ceil() as usize)
     }
 
     /// Whether a pose that was searched takes the place of the doubted one.
@@ -146,9 +203,74 @@ impl Tracker {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::deskewing::{MeasuredScan, MotionWithin};
     use super::super::super::scale::Scale;
     use super::super::super::settings::OdometrySettings;
     use super::*;
+    use crate::random::uniform;
+    use nalgebra::Vector6;
+
+    /// A scan of a furnished room, in voxels, of which `kind` is the furniture.
+    fn scan(kind: u64, settings: &OdometrySettings) -> ThinnedScan {
+        let at = |i: usize, k: u64| uniform(i, k) - 0.5;
+        let walls = (0..12_000).map(|i| match i % 3 {
+            0 => [50.0 * at(i, 0), 36.0 * at(i, 1), -8.0],
+            1 => [50.0 * at(i, 0), if i % 2 == 0 { -18.0 } else { 18.0 }, 16.0 * at(i, 1)],
+            _ => [if i % 2 == 0 { -25.0 } else { 25.0 }, 36.0 * at(i, 0), 16.0 * at(i, 1)],
+        });
+        let boxes = (0..9_000).map(|i| {
+            let middle: [f64; 3] =
+                [0, 1, 2].map(|k| [44.0, 30.0, 10.0][k] * at(i / 900, 10 * kind + k as u64));
+            let mut point = [0, 1, 2].map(|k| 5.0 * at(i, k));
+            point[i % 3] = if i % 2 == 0 { 2.5 } else { -2.5 };
+            [0, 1, 2].map(|k| middle[k] + point[k])
+        });
+        let points = walls.chain(boxes).collect();
+        let within = MotionWithin {
+            times: Vec::new(),
+            twist: Vector6::zeros(),
+            since: None,
+            farthest: 1.0,
+            deviation: 1.0,
+            range: 20.0,
+        };
+        ThinnedScan::new(MeasuredScan { points, times: None }, within, settings)
+    }
+
+    #[test]
+    fn long_after_the_sensor_was_lost_each_scan_was_aligned_at_its_last_pose() {
+        let settings = OdometrySettings::default();
+        let first = scan(1, &settings);
+        let mut tracker = Tracker::new(&settings, &Scale::new(&first.points, Some(1.0), &settings.scale));
+        for _ in 0..3 {
+            assert_eq!(tracker.follow(&first).len(), 1);
+        }
+        let here = RigidTransform::identity();
+        let elsewhere = RigidTransform::from_rotation_vector([0.0, 0.0, 0.7], [9.0, 4.0, 0.0]);
+        assert!(tracker.may_be_at(&first, &elsewhere));
+        (0..10).for_each(|_| tracker.skip());
+        assert!(tracker.may_be_at(&first, &here));
+        assert!(!tracker.may_be_at(&first, &elsewhere));
+    }
+
+    #[test]
+    fn a_sensor_that_was_carried_and_turned_is_found_by_how_far_it_sees() {
+        let settings = OdometrySettings::default();
+        let first = scan(1, &settings);
+        let mut tracker = Tracker::new(&settings, &Scale::new(&first.points, Some(1.0), &settings.scale));
+        tracker.follow(&first);
+        (0..10).for_each(|_| tracker.skip());
+        let truth = RigidTransform::from_rotation_vector([0.02, -0.03, 2.0], [3.0, 2.0, 0.5]);
+        let moved = ThinnedScan::new(
+            MeasuredScan { points: truth.inverse().transform_points(&first.points), times: None },
+            tracker.expected_within(),
+            &settings,
+        );
+        let (found, _) = tracker.among_keyframes(&moved, None, By::Panorama).unwrap();
+        let off = (truth.inverse() * found.T_map_scan).log();
+        assert!(off.iter().all(|component| component.abs() < 0.05), "{off:?}");
+        assert!(tracker.among_keyframes(&scan(2, &settings), None, By::Panorama).is_none());
+    }
 
     #[test]
     fn a_map_left_long_ago_looked_for_correspondences_ever_farther() {
