@@ -88,12 +88,11 @@ impl Candidate<'_> {
         self.sought.view.judged(&[self.T_scene_model], is_free)[0]
     }
 
-    /// Evidence with what rivals say, too, where free space is known: elsewhere little tells right from wrong ones.
+    /// Evidence with what rivals say, too. Where free space is not known they count for nothing: it was not learnt how much
+    /// they would.
     fn among_rivals(&self, own: Evidence) -> Evidence {
-        if self.sought.view.viewpoint.is_none() {
-            return own;
-        }
-        let (measures, log_odds) = own.measures.among_rivals(own.log_odds, self.rivals);
+        let (measures, among_rivals) = own.measures.among_rivals(own.log_odds, self.rivals);
+        let log_odds = if self.sought.view.viewpoint.is_some() { among_rivals } else { own.log_odds };
         Evidence { measures, log_odds, ..own }
     }
 }
