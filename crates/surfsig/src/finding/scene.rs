@@ -75,13 +75,15 @@ impl<'a> Scene<'a> {
     ) -> Result<Self, Error> {
         let spacing = point_spacing(&scan.points);
         let is_unknown = !scan.scan().is_oriented();
-        let viewpoint = scan.viewpoint.unwrap_or_else(|| scan.center.map(|x| -x));
-        // Noise and mixed pixels hide more of a depth image than of what is known to be no scan only by that.
-        let from_there = || -> Vec<[f64; 3]> {
-            scan.points.iter().map(|point| [0, 1, 2].map(|k| point[k] - viewpoint[k])).collect()
+        let origin = scan.center.map(|x| -x);
+        let viewpoint = scan.viewpoint.unwrap_or(origin);
+        // Noise and mixed pixels hide more points of a depth image than are hidden from a viewpoint that may be any: that
+        // it is the origin of the coordinates speaks for it.
+        let from_origin = || -> Vec<[f64; 3]> {
+            scan.points.iter().map(|point| [0, 1, 2].map(|k| point[k] - origin[k])).collect()
         };
-        let is_seen =
-            all_seen_from(viewpoint, &scan.points, spacing) || measured_from_origin(&from_there(), spacing);
+        let is_seen = all_seen_from(viewpoint, &scan.points, spacing)
+            || (viewpoint == origin && measured_from_origin(&from_origin(), spacing));
         let viewpoint = is_seen.then_some(viewpoint);
         let viewpoint = viewpoint.or_else(|| is_unknown.then(|| estimated_viewpoint(&scan.points)).flatten());
         let scan = CenteredScan { viewpoint: viewpoint.filter(|_| scan.directions.is_none()), ..scan };
