@@ -78,12 +78,12 @@ impl<'a> Scene<'a> {
         let origin = scan.center.map(|x| -x);
         let viewpoint = scan.viewpoint.unwrap_or(origin);
         // Noise and mixed pixels hide more points of a depth image than are hidden from a viewpoint that may be any: that
-        // it is the origin of the coordinates speaks for it.
+        // the given one is the origin of the coordinates speaks for it.
         let from_origin = || -> Vec<[f64; 3]> {
             scan.points.iter().map(|point| [0, 1, 2].map(|k| point[k] - origin[k])).collect()
         };
         let is_seen = all_seen_from(viewpoint, &scan.points, spacing)
-            || (viewpoint == origin && measured_from_origin(&from_origin(), spacing));
+            || (scan.viewpoint == Some(origin) && measured_from_origin(&from_origin(), spacing));
         let viewpoint = is_seen.then_some(viewpoint);
         let viewpoint = viewpoint.or_else(|| is_unknown.then(|| estimated_viewpoint(&scan.points)).flatten());
         let scan = CenteredScan { viewpoint: viewpoint.filter(|_| scan.directions.is_none()), ..scan };
