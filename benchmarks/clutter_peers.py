@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from registration_peers import open3d_alignment
 
 PPF_STEP = 0.025
 """Of the model's diameter: distance between its sampled points, as in OpenCV's example."""
@@ -48,30 +49,16 @@ def by_opencv(model: Any, normals: Any, scene: Any, diameter: float) -> Any:
 
 
 def by_open3d(model: Any, normals: Any, scene: Any, diameter: float) -> Any:
-    """FPFH, RANSAC and point-to-plane ICP, as Open3D's tutorial on global registration has them."""
+    """Align the model with the scene by FPFH, RANSAC and ICP."""
     import open3d
 
-    registration, search = open3d.pipelines.registration, open3d.geometry.KDTreeSearchParamHybrid
     voxel = FPFH_VOXEL * diameter
     known = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(model))
     known.normals = open3d.utility.Vector3dVector(normals)
     seen = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(scene)).voxel_down_sample(voxel)
-    seen.estimate_normals(search(2 * voxel, 30))
+    seen.estimate_normals(open3d.geometry.KDTreeSearchParamHybrid(2 * voxel, 30))
     seen.orient_normals_towards_camera_location(np.zeros(3))
-    clouds = [known.voxel_down_sample(voxel), seen]
-    features = [registration.compute_fpfh_feature(cloud, search(5 * voxel, 100)) for cloud in clouds]
-    open3d.utility.random.seed(0)
-    rough = registration.registration_ransac_based_on_feature_matching(
-        *clouds, *features, True, 1.5 * voxel,
-        registration.TransformationEstimationPointToPoint(False), 3,
-        [
-            registration.CorrespondenceCheckerBasedOnEdgeLength(0.9),
-            registration.CorrespondenceCheckerBasedOnDistance(1.5 * voxel),
-        ],
-        registration.RANSACConvergenceCriteria(100_000, 0.999),
-    )  # fmt: skip
-    plane = registration.TransformationEstimationPointToPlane()
-    return registration.registration_icp(*clouds, voxel, rough.transformation, plane).transformation
+    return open3d_alignment([known.voxel_down_sample(voxel), seen], voxel).transformation
 
 
 METHODS = {"opencv": by_opencv, "open3d": by_open3d}

@@ -23,18 +23,26 @@ FEWEST_INLIERS = 5
 
 
 def by_open3d(source: Any, target: Any, eyes: Any, voxel: float) -> tuple[Any, bool]:
-    """FPFH, RANSAC and point-to-plane ICP with the settings of Open3D's tutorial on global registration."""
+    """Align by Open3D; whether normals know their sides is said by the sensors' places."""
     import open3d  # type: ignore[import-not-found]
 
-    registration, search = open3d.pipelines.registration, open3d.geometry.KDTreeSearchParamHybrid
-    clouds, features = [], []
+    clouds = []
     for points, eye in ((source, eyes[0]), (target, eyes[1])):
         cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points)).voxel_down_sample(voxel)
-        cloud.estimate_normals(search(2 * voxel, 30))
+        cloud.estimate_normals(open3d.geometry.KDTreeSearchParamHybrid(2 * voxel, 30))
         if eye is not None:
             cloud.orient_normals_towards_camera_location(eye)
         clouds.append(cloud)
-        features.append(registration.compute_fpfh_feature(cloud, search(5 * voxel, 100)))
+    found = open3d_alignment(clouds, voxel)
+    return found.transformation, bool(found.fitness >= LEAST_FITNESS)
+
+
+def open3d_alignment(clouds: list[Any], voxel: float) -> Any:
+    """FPFH, RANSAC and point-to-plane ICP of two thinned clouds, as in Open3D's tutorial."""
+    import open3d
+
+    registration, search = open3d.pipelines.registration, open3d.geometry.KDTreeSearchParamHybrid
+    features = [registration.compute_fpfh_feature(cloud, search(5 * voxel, 100)) for cloud in clouds]
     open3d.utility.random.seed(0)
     rough = registration.registration_ransac_based_on_feature_matching(
         *clouds, *features, True, 1.5 * voxel,
@@ -46,8 +54,7 @@ def by_open3d(source: Any, target: Any, eyes: Any, voxel: float) -> tuple[Any, b
         registration.RANSACConvergenceCriteria(100_000, 0.999),
     )  # fmt: skip
     plane = registration.TransformationEstimationPointToPlane()
-    fine = registration.registration_icp(*clouds, voxel, rough.transformation, plane)
-    return fine.transformation, bool(fine.fitness >= LEAST_FITNESS)
+    return registration.registration_icp(*clouds, voxel, rough.transformation, plane)
 
 
 def by_kiss(source: Any, target: Any, eyes: Any, voxel: float) -> tuple[Any, bool]:

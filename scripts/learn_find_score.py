@@ -79,7 +79,7 @@ def terms(measures: dict[str, float]) -> list[float]:
 
 
 def terms_among_rivals(measures: dict[str, float]) -> list[float]:
-    """Give what `Measures::among_rivals` computes; without a viewpoint all but the constant are 0."""
+    """Give the terms that `Measures::among_rivals` weighs."""
     return [1.0, *(measures[name] for name in ("own_log_odds", "margin_here", "margin_elsewhere"))]
 
 

@@ -25,7 +25,8 @@ pub(super) struct Sought<'a> {
     pub model: Model,
     pub view: ModelView<'a>,
     tree: KdTree,
-    extent: f64,
+    /// Largest distance of the model's samples from its centre.
+    pub extent: f64,
     /// See [`Sought::surface`].
     surface: OnceLock<TargetSurface>,
 }
@@ -39,11 +40,6 @@ impl<'a> Sought<'a> {
     /// All of the model's points as the surface that the scene's points are fitted to, made when it is first asked for.
     pub fn surface(&self) -> &TargetSurface {
         self.surface.get_or_init(|| TargetSurface::new(self.model.points.clone(), self.view.scene.voxel))
-    }
-
-    /// Largest distance of the model's samples from its centre.
-    pub fn extent(&self) -> f64 {
-        self.extent
     }
 
     /// Whether a point, in the model's axes, is at its surface.
@@ -175,7 +171,7 @@ pub(super) fn accepted(
         if evidence.log_odds < least {
             continue;
         }
-        let examined = refined.examined(evidence.support, unexplained.of(fitted), settings);
+        let examined = refined.examined(evidence.support, is_free, settings);
         let own = fitted.near(scene.scan.points.par_iter().copied(), settings.own_distance);
         let own: Vec<usize> = own.into_iter().filter(|&number| !is_taken[number]).collect();
         own.iter().for_each(|&number| is_taken[number] = true);
@@ -210,21 +206,21 @@ fn refined<'a>(
     let near: Vec<[f64; 3]> =
         near.into_iter().filter(|&number| !is_taken[number]).map(|number| points[number]).collect();
     let sample = even_sample(&near, settings.max_fitted, voxel);
-    let by = |settings: &PointToSurfaceSettings| {
-        // The model's surface is the target: it is whole, and denser than what is seen.
-        let fit = candidate.sought.surface().align(&sample, candidate.T_scene_model.inverse(), settings)?;
-        let fitted =
-            Candidate { T_scene_model: fit.T_target_source.inverse(), is_fitted: true, ..candidate.clone() };
-        Some(Refined { candidate: fitted, fit, sample: sample.clone() })
-    };
-    let refined = by(&settings.point_to_surface)?;
-    let evidence = refined.candidate.judged(is_free);
+    // The model's surface is the target: it is whole, and denser than what is seen.
+    let surface = candidate.sought.surface();
+    let start = candidate.T_scene_model.inverse();
+    let fit = surface.align(&sample, start, &settings.point_to_surface)?;
+    let fitted =
+        Candidate { T_scene_model: fit.T_target_source.inverse(), is_fitted: true, ..candidate.clone() };
+    let evidence = fitted.judged(is_free);
     if evidence.log_odds >= candidate.evidence.log_odds - GAIN_OF_FIT {
-        return Some((refined, evidence));
+        return Some((Refined { candidate: fitted, fit, sample }, evidence));
     }
     // Where the points hardly determine a motion, the fit has followed their noise and left the place that was judged.
     let there = PointToSurfaceSettings { max_iterations: 0, ..settings.point_to_surface };
-    Some((by(&there)?, candidate.evidence))
+    let fit = surface.align(&sample, start, &there)?;
+    let stays = Candidate { is_fitted: true, ..candidate.clone() };
+    Some((Refined { candidate: stays, fit, sample }, candidate.evidence))
 }
 
 fn instance(

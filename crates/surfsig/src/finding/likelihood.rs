@@ -59,8 +59,8 @@ pub struct Measures {
     pub constraint: f64,
     /// Logarithm of the odds that the transform is right, by all of the above.
     pub own_log_odds: f64,
-    /// By how much it is above that of the best other transform that explains
-    /// the same part of the scene, symmetries of the model left out.
+    /// By how much it is above that of the best other transform that explains the same part of the scene, symmetries of the
+    /// model left out.
     pub margin_here: f64,
     /// The same of the fifth best transform elsewhere.
     pub margin_elsewhere: f64,

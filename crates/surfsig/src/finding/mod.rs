@@ -150,13 +150,12 @@ fn candidates_of<'a>(
         let judged = last.judged(&aligned, &vec![true; fine.samples().len()]);
         let sought = Arc::new(Sought::new(number, side, last));
         let least = least_before_fit(settings);
-        let rivals = RivalOdds::of_each(&sought, &aligned, &judged);
-        let all = aligned.into_iter().zip(judged).zip(rivals);
-        let good = all.filter(|((_, found), _)| found.log_odds >= least);
-        candidates.extend(good.map(|((transform, evidence), rivals)| Candidate {
+        let good: Vec<usize> = (0..judged.len()).filter(|&i| judged[i].log_odds >= least).collect();
+        let rivals = RivalOdds::of(&sought, &aligned, &judged, &good);
+        candidates.extend(good.into_iter().zip(rivals).map(|(number, rivals)| Candidate {
             sought: Arc::clone(&sought),
-            T_scene_model: transform,
-            evidence,
+            T_scene_model: aligned[number],
+            evidence: judged[number],
             rivals,
             is_fitted: false,
         }));

@@ -6,8 +6,10 @@
 use super::acceptance::Sought;
 use super::evidence::Evidence;
 use crate::alignment::transformed;
+use crate::depth_image::SurfacePlace;
 use crate::geometry::RigidTransform;
 use crate::random::some_of;
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Samples of the model by which transforms are compared.
@@ -38,14 +40,22 @@ pub(super) struct RivalOdds {
 }
 
 impl RivalOdds {
-    /// Those of each of some transforms (T_scene_model) of a model.
-    pub fn of_each(sought: &Sought<'_>, transforms: &[RigidTransform], evidence: &[Evidence]) -> Vec<Self> {
+    /// Those of some of a model's transforms (T_scene_model), which have numbers.
+    pub fn of(
+        sought: &Sought<'_>,
+        transforms: &[RigidTransform],
+        evidence: &[Evidence],
+        numbers: &[usize],
+    ) -> Vec<Self> {
         let compared = Compared::new(sought, transforms);
-        let of = |one: usize| {
+        let rivals: Vec<usize> =
+            (0..transforms.len()).filter(|&number| evidence[number].log_odds > NO_RIVAL).collect();
+        let of = |&one: &usize| {
             let (mut here, mut elsewhere) = (NO_RIVAL, Vec::new());
-            for other in (0..transforms.len()).filter(|&other| !compared.are_one(one, other)) {
-                let odds = evidence[other].log_odds.max(NO_RIVAL);
-                if !compared.explain_the_same(one, other) {
+            let on_scene = compared.on_scene(one);
+            for &other in rivals.iter().filter(|&&other| !compared.are_one(one, other)) {
+                let odds = evidence[other].log_odds;
+                if !compared.explain_the_same(&on_scene, one, other) {
                     elsewhere.push(odds);
                 } else if odds > here && !compared.is_symmetry(one, other) {
                     here = odds;
@@ -54,36 +64,31 @@ impl RivalOdds {
             elsewhere.sort_by(|a, b| b.total_cmp(a));
             Self { here, elsewhere: elsewhere.get(ELSEWHERE - 1).copied().unwrap_or(NO_RIVAL) }
         };
-        (0..transforms.len()).into_par_iter().map(of).collect()
+        numbers.par_iter().map(of).collect()
     }
 }
 
-/// Transforms of a model with some of its samples under them.
+/// Transforms of a model, which are compared by some of its samples.
 struct Compared<'a> {
     sought: &'a Sought<'a>,
     transforms: &'a [RigidTransform],
-    samples: Vec<[f64; 3]>,
-    /// The numbers of those that lie on the scene under each transform.
-    on_scene: Vec<Vec<usize>>,
+    samples: Vec<SurfacePlace>,
 }
 
 impl<'a> Compared<'a> {
     fn new(sought: &'a Sought<'a>, transforms: &'a [RigidTransform]) -> Self {
-        let view = &sought.view;
-        let chosen = some_of(view.samples.len(), COMPARED);
-        let touching = |transform: &RigidTransform| {
-            let is_near = |&number: &usize| {
-                let moved = transformed(transform, &view.samples[chosen[number]]);
-                view.scene.surface.nearest(&moved, view.scene.voxel).is_some()
-            };
-            (0..chosen.len()).filter(is_near).collect()
+        let all = &sought.view.samples;
+        let samples = some_of(all.len(), COMPARED).into_iter().map(|number| all[number]).collect();
+        Self { sought, transforms, samples }
+    }
+
+    /// The samples that lie on the scene under a transform.
+    fn on_scene(&self, one: usize) -> Vec<&SurfacePlace> {
+        let scene = &self.sought.view.scene;
+        let is_near = |sample: &&SurfacePlace| {
+            scene.surface.nearest(&transformed(&self.transforms[one], sample), scene.voxel).is_some()
         };
-        Self {
-            on_scene: transforms.par_iter().map(touching).collect(),
-            samples: chosen.iter().map(|&number| view.samples[number].place.map(f64::from)).collect(),
-            sought,
-            transforms,
-        }
+        self.samples.iter().filter(is_near).collect()
     }
 
     /// Whether two transforms move the model to about the same place.
@@ -91,30 +96,36 @@ impl<'a> Compared<'a> {
         let [one, other] = [one, other].map(|number| &self.transforms[number]);
         let turn = one.rotation - other.rotation;
         let shift = one.translation - other.translation;
-        let distance = |sample: &[f64; 3]| (turn * nalgebra::Vector3::from(*sample) + shift).norm();
+        let distance =
+            |sample: &SurfacePlace| (turn * Vector3::from(sample.place.map(f64::from)) + shift).norm();
         let sum: f64 = self.samples.iter().map(distance).sum();
-        sum <= SAME * self.sought.extent() * self.samples.len() as f64
+        sum <= SAME * self.sought.extent * self.samples.len() as f64
     }
 
     /// Share of some samples that lie on the model, within a distance, when one transform has moved them and the other one
     /// the model.
-    fn share_on(&self, numbers: impl Iterator<Item = usize>, one: usize, other: usize, distance: f64) -> f64 {
+    fn share_on<'b>(
+        &self,
+        samples: impl ExactSizeIterator<Item = &'b SurfacePlace>,
+        one: usize,
+        other: usize,
+        distance: f64,
+    ) -> f64 {
         let between = self.transforms[other].inverse() * self.transforms[one];
-        let (mut on, mut all) = (0_usize, 0_usize);
-        for number in numbers {
-            all += 1;
-            on += usize::from(self.sought.is_on(between.transform_point(self.samples[number]), distance));
-        }
-        on as f64 / all.max(1) as f64
+        let all = samples.len().max(1);
+        let is_on = |sample: &&SurfacePlace| {
+            self.sought.is_on(between.transform_point(sample.place.map(f64::from)), distance)
+        };
+        samples.filter(is_on).count() as f64 / all as f64
     }
 
-    fn explain_the_same(&self, one: usize, other: usize) -> bool {
-        let on_scene = self.on_scene[one].iter().copied();
-        self.share_on(on_scene, one, other, self.sought.view.scene.voxel) >= SAME_PART
+    fn explain_the_same(&self, on_scene: &[&SurfacePlace], one: usize, other: usize) -> bool {
+        let voxel = self.sought.view.scene.voxel;
+        self.share_on(on_scene.iter().copied(), one, other, voxel) >= SAME_PART
     }
 
     fn is_symmetry(&self, one: usize, other: usize) -> bool {
-        let all = 0..self.samples.len();
-        self.share_on(all, one, other, ON_ITSELF * self.sought.extent()) >= SYMMETRIC
+        let distance = ON_ITSELF * self.sought.extent;
+        self.share_on(self.samples.iter(), one, other, distance) >= SYMMETRIC
     }
 }

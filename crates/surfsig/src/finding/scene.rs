@@ -7,7 +7,7 @@ use crate::alignment::OrientedSurface;
 use crate::depth_image::{DepthImage, SurfacePlace};
 use crate::scan::CenteredScan;
 use crate::spacing::point_spacing;
-use crate::visibility::{all_seen_from, estimated_viewpoint, measured_from_origin};
+use crate::visibility::{all_seen_from, estimated_viewpoint, measured_from};
 use crate::voxels::Voxels;
 use crate::{Error, FieldPlaces, Monitor};
 use nalgebra::Vector3;
@@ -79,11 +79,8 @@ impl<'a> Scene<'a> {
         let viewpoint = scan.viewpoint.unwrap_or(origin);
         // Noise and mixed pixels hide more points of a depth image than are hidden from a viewpoint that may be any: that
         // the given one is the origin of the coordinates speaks for it.
-        let from_origin = || -> Vec<[f64; 3]> {
-            scan.points.iter().map(|point| [0, 1, 2].map(|k| point[k] - origin[k])).collect()
-        };
         let is_seen = all_seen_from(viewpoint, &scan.points, spacing)
-            || (scan.viewpoint == Some(origin) && measured_from_origin(&from_origin(), spacing));
+            || (scan.viewpoint == Some(origin) && measured_from(origin, &scan.points, spacing));
         let viewpoint = is_seen.then_some(viewpoint);
         let viewpoint = viewpoint.or_else(|| is_unknown.then(|| estimated_viewpoint(&scan.points)).flatten());
         let scan = CenteredScan { viewpoint: viewpoint.filter(|_| scan.directions.is_none()), ..scan };

@@ -350,7 +350,7 @@ fn rivals_explain_the_same_or_are_elsewhere_and_symmetries_are_none() {
             visible: 1.0,
             overlap: 1.0,
         });
-        RivalOdds::of_each(&sought, &transforms, &evidence)
+        RivalOdds::of(&sought, &transforms, &evidence, &[0, 1, 2, 3])
     };
     let brick = odds_of(brick());
     assert_eq!(brick[0].here, -12.0, "half a turn is a symmetry, the second is the same: {brick:?}");

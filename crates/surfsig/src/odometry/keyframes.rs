@@ -7,9 +7,9 @@ mod search;
 pub(super) use search::By;
 
 use super::local_map::LocalMap;
+use super::motions::rotation_angle;
 use super::settings::OdometrySettings;
 use super::thinned_scan::ThinnedScan;
-use super::tracker::rotation_angle;
 use super::voxel_index::squared_distance;
 use crate::visibility::SphericalRangeImage;
 use crate::{FieldPlaces, RigidTransform};

@@ -3,8 +3,9 @@
 //! A scan is thinned ([`thinned_scan`]) by lengths of the first one ([`scale`]), expected where the last motion leads, and
 //! aligned ([`scan_alignment`]) with the map of the surroundings ([`local_map`]). Where it lies there worse than scans
 //! did of late ([`expectation`]), it is searched: by other motions, by rotations of the sensor ([`rotation_search`]), of
-//! which few points tell the likeliest ([`rough_alignment`]), and among keyframes ([`keyframes`]). Along motions that the map does not determine, as along a smooth corridor
-//! (halves of the map's neighbourhoods tell), the last motion goes on. [`tracker`] goes from scan to scan. Where it stays lost, or the lengths do not
+//! which few points tell the likeliest ([`rough_alignment`]), and among keyframes ([`keyframes`]). Along motions that the
+//! map does not determine, as along a smooth corridor (halves of the map's neighbourhoods tell), the last motion goes on;
+//! [`motions`] says how large they are. [`tracker`] goes from scan to scan. Where it stays lost, or the lengths do not
 //! fit, another map is begun ([`segment`], [`segments`]). Loops are looked for around where the sensor is expected, as far as
 //! the way around may have drifted ([`translation_search`]).
 
@@ -13,6 +14,7 @@ mod deskewing;
 mod expectation;
 mod keyframes;
 mod local_map;
+mod motions;
 mod point_times;
 mod pose_covariance;
 mod result;

@@ -1,11 +1,11 @@
 //! Many starts, of which some of a scan's points tell the likeliest.
 
 use super::local_map::LocalMap;
+use super::motions::different_poses;
 use super::rotation_search::{points_near, some_points};
 use super::scan_alignment::align_roughly;
 use super::settings::OdometrySettings;
 use super::thinned_scan::ThinnedScan;
-use super::tracker::distance_at_range;
 use crate::RigidTransform;
 
 /// How starts are tried; lengths are in voxels.
@@ -37,16 +37,8 @@ impl Trials<'_> {
         tried.sort_by_key(|(near, _)| std::cmp::Reverse(*near));
         let fewer = (settings.overlap_gain * some.len() as f64) as usize;
         let least = tried.first().map_or(0, |(most, _)| most.saturating_sub(fewer)).max(least);
-        let mut chosen: Vec<RigidTransform> = Vec::new();
-        for (_, pose) in tried.into_iter().filter(|(near, _)| *near >= least) {
-            let is_apart = |other: &RigidTransform| {
-                distance_at_range(self.range, &(other.inverse() * pose))
-                    > self.settings.prediction.min_correspondence_distance
-            };
-            if chosen.iter().all(is_apart) {
-                chosen.push(pose);
-            }
-        }
-        chosen
+        let likely = tried.into_iter().filter(|(near, _)| *near >= least).map(|(_, pose)| pose);
+        let apart = self.settings.prediction.min_correspondence_distance;
+        different_poses(likely, self.range, apart, usize::MAX)
     }
 }

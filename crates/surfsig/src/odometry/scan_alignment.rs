@@ -73,7 +73,7 @@ pub(super) struct Start {
     pub pose: RigidTransform,
     /// Between corresponding points, in the first round.
     pub max_distance: f64,
-    /// Whether nothing is known of the motion to it: few points may then lead astray, and the first round takes all.
+    /// Whether nothing is known of the motion to it: few points may then lead to a wrong pose, and the first round takes all.
     pub is_guess: bool,
 }
 

@@ -35,7 +35,7 @@ pub(super) struct ThinnedScan {
 impl ThinnedScan {
     /// `expected` is the motion within the scan, in which times are not looked at.
     pub fn new(scan: MeasuredScan, expected: MotionWithin, settings: &OdometrySettings) -> Self {
-        let Some(times) = &scan.times else { return Self::of_points(scan.points, None, None, settings) };
+        let Some(times) = &scan.times else { return Self::of_one_moment(scan.points, settings) };
         let measured = deskewed(&scan.points, times, &expected.twist);
         let voxels = Voxels::new(&measured, 1.0);
         let sums = voxels.sums(times.iter().map(|time| [*time, 0.0, 0.0]));
@@ -43,6 +43,11 @@ impl ThinnedScan {
         let times = sums.iter().zip(&voxels.counts).map(|(sum, count)| sum[0] / f64::from(*count)).collect();
         let motion = MotionWithin { times, ..expected };
         Self::of_points(measured, Some(motion), Some(scan), settings)
+    }
+
+    /// Of points about the sensor that were measured at one time.
+    pub fn of_one_moment(points: Vec<[f64; 3]>, settings: &OdometrySettings) -> Self {
+        Self::of_points(points, None, None, settings)
     }
 
     fn of_points(

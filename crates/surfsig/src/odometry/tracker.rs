@@ -11,6 +11,7 @@ pub(super) use loops::Loop;
 use super::expectation::Expectation;
 use super::keyframes::{Keyframes, Which};
 use super::local_map::LocalMap;
+use super::motions::{distance_at_range, power};
 use super::pose_covariance::Covariance;
 use super::result::ScanStatus;
 use super::scale::{Scale, distances};
@@ -371,35 +372,5 @@ impl Tracker {
         self.last = step.T_map_scan;
         self.since = 1;
         self.number += 1;
-    }
-}
-
-/// The motion of several steps.
-fn power(motion: RigidTransform, steps: usize) -> RigidTransform {
-    RigidTransform::exp(motion.log().map(|component| component * steps as f64))
-}
-
-/// How far a motion carries a point at a range, at most.
-pub(super) fn distance_at_range(range: f64, motion: &RigidTransform) -> f64 {
-    2.0 * range * (0.5 * rotation_angle(motion)).sin() + motion.translation.norm()
-}
-
-/// The angle of a motion's rotation, 0 to pi.
-pub(super) fn rotation_angle(motion: &RigidTransform) -> f64 {
-    let [x, y, z, ..] = motion.log();
-    (x * x + y * y + z * z).sqrt()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_motion_that_goes_on_is_repeated() {
-        let motion = RigidTransform::from_rotation_vector([0.1, -0.2, 0.4], [1.0, 2.0, -0.5]);
-        let difference = (motion * motion * motion).inverse() * power(motion, 3);
-        assert!(difference.log().iter().all(|component| component.abs() < 1e-13));
-        assert_eq!(power(motion, 0), RigidTransform::identity());
-        assert!((rotation_angle(&motion) - 0.21_f64.sqrt()).abs() < 1e-15);
     }
 }

@@ -8,5 +8,6 @@ mod spherical_range_image;
 
 pub use estimated_viewpoint::estimated_viewpoint;
 pub use hidden::hidden_from;
+pub(crate) use possible_viewpoint::measured_from;
 pub use possible_viewpoint::{all_seen_from, measured_from_origin};
 pub use spherical_range_image::{RangeImageSettings, SphericalRangeImage, Visibility};

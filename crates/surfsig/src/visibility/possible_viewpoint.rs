@@ -97,7 +97,12 @@ pub fn all_seen_from(viewpoint: [f64; 3], points: &[[f64; 3]], spacing: f64) -> 
 /// assert!(!surfsig::measured_from_origin(&box_of_points, 0.1));
 /// ```
 pub fn measured_from_origin(points: &[[f64; 3]], spacing: f64) -> bool {
-    let Some(rays) = Rays::new([0.0; 3], points) else { return false };
+    measured_from([0.0; 3], points, spacing)
+}
+
+/// The same for a sensor at the origin of its coordinates, where the points are given about another place.
+pub(crate) fn measured_from(viewpoint: [f64; 3], points: &[[f64; 3]], spacing: f64) -> bool {
+    let Some(rays) = Rays::new(viewpoint, points) else { return false };
     if rays.are_far() || rays.start_on_surface() {
         return false;
     }

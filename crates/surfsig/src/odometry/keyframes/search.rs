@@ -1,11 +1,11 @@
 //! Where a sensor is that was lost: the keyframes that see as far as its scan, or whose keypoints match those of it.
 
 use super::super::local_map::LocalMap;
+use super::super::motions::{different_poses, distance_at_range};
 use super::super::rotation_search::{points_near, some_points};
 use super::super::scan_alignment::{ScanAlignment, Start, align, align_roughly};
 use super::super::settings::RelocalisationSettings;
 use super::super::thinned_scan::ThinnedScan;
-use super::super::tracker::distance_at_range;
 use super::panorama::Panorama;
 use super::ranges::Ranges;
 use super::{Keyframe, Keyframes, Which, in_float32};
@@ -67,7 +67,8 @@ impl Keyframes {
     /// Whether matches with the keyframe next to a pose propose the same: along a corridor there are other places that a
     /// scan fits to.
     fn do_matches_say(&mut self, scan: &ThinnedScan, pose: &RigidTransform) -> bool {
-        let apart = |other: &RigidTransform| distance_at_range(self.median_range, &(other.inverse() * *pose));
+        let range = self.median_range;
+        let apart = |other: &RigidTransform| distance_at_range(range, &(other.inverse() * *pose));
         let to_keyframe = |number: &usize| apart(&self.kept[*number].T_map_scan);
         let nearest = (0..self.kept.len()).min_by(|a, b| to_keyframe(a).total_cmp(&to_keyframe(b)));
         let Some(number) = nearest else { return false };
@@ -75,7 +76,6 @@ impl Keyframes {
         let ours = described(&in_float32(&scan.means(settings.detail_voxel)), self.patch_radius, settings);
         let matched = self.matched(number, &ours);
         self.forget_descriptions();
-        let apart = |other: &RigidTransform| distance_at_range(self.median_range, &(other.inverse() * *pose));
         let settings = &self.settings.relocalisation;
         matched.is_some_and(|(agree, matched)| {
             agree >= settings.confirming_matches && apart(&matched) <= settings.confirming_distance
@@ -112,18 +112,9 @@ impl Keyframes {
         self.distinct(poses.into_iter().map(|(_, pose)| pose), apart)
     }
 
-    /// The first poses that are apart from those before, of a point at the median range, as many as are tried.
+    /// The first poses that are apart from those before, as many as are tried.
     fn distinct(&self, poses: impl Iterator<Item = RigidTransform>, apart: f64) -> Vec<RigidTransform> {
-        let mut chosen: Vec<RigidTransform> = Vec::new();
-        for pose in poses {
-            let is_apart = |other: &RigidTransform| {
-                distance_at_range(self.median_range, &(other.inverse() * pose)) > apart
-            };
-            if chosen.len() < self.settings.relocalisation.max_trials && chosen.iter().all(is_apart) {
-                chosen.push(pose);
-            }
-        }
-        chosen
+        different_poses(poses, self.median_range, apart, self.settings.relocalisation.max_trials)
     }
 
     /// The keyframes that are searched now: half of them the nearest to where the sensor was, the others those that see
@@ -208,11 +199,9 @@ fn described(points: &[[f32; 3]], radius: f64, settings: &RelocalisationSettings
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::deskewing::{MeasuredScan, MotionWithin};
     use super::super::super::settings::OdometrySettings;
     use super::*;
     use crate::random::uniform;
-    use nalgebra::Vector6;
 
     #[test]
     fn the_oldest_descriptions_are_forgotten() {
@@ -220,15 +209,7 @@ mod tests {
         settings.relocalisation.max_descriptions = 3;
         let at = |i: usize, k: u64| uniform(i, k) - 0.5;
         let floor = (0..4000).map(|i| [40.0 * at(i, 0), 40.0 * at(i, 1), -4.0]);
-        let within = MotionWithin {
-            times: Vec::new(),
-            twist: Vector6::zeros(),
-            since: None,
-            farthest: 1.0,
-            deviation: 1.0,
-            range: 15.0,
-        };
-        let scan = ThinnedScan::new(MeasuredScan { points: floor.collect(), times: None }, within, &settings);
+        let scan = ThinnedScan::of_one_moment(floor.collect(), &settings);
         let mut keyframes = Keyframes::new(&settings, 15.0, 5.0);
         for number in 0..8 {
             let pose = RigidTransform::from_rotation_vector([0.0; 3], [10.0 * f64::from(number), 0.0, 0.0]);
@@ -259,16 +240,7 @@ mod tests {
                 [0, 1, 2].map(|k| middle[k] + point[k])
             });
             let floor = (0..6000).map(|i| [60.0 * at(i, 3), 60.0 * at(i, 4), -9.0]);
-            let within = MotionWithin {
-                times: Vec::new(),
-                twist: Vector6::zeros(),
-                since: None,
-                farthest: 1.0,
-                deviation: 1.0,
-                range: 20.0,
-            };
-            let points = floor.chain(boxes).collect();
-            ThinnedScan::new(MeasuredScan { points, times: None }, within, &settings)
+            ThinnedScan::of_one_moment(floor.chain(boxes).collect(), &settings)
         };
         let here = RigidTransform::identity();
         let mut keyframes = Keyframes::new(&settings, 20.0, 5.0);

@@ -1,10 +1,11 @@
 //! What a scan with a pose adds to the map, and what its pose is off by.
 
+use super::super::motions::rotation_angle;
 use super::super::pose_covariance::{Covariance, sum_of_alike};
 use super::super::result::ScanStatus;
 use super::super::scan_alignment::ScanAlignment;
 use super::super::thinned_scan::ThinnedScan;
-use super::{Step, Tracker, rotation_angle};
+use super::{Step, Tracker};
 use crate::RigidTransform;
 use crate::alignment::{orthonormal, unscaled};
 use nalgebra::Vector3;

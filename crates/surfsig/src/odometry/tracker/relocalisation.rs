@@ -203,12 +203,10 @@ impl Tracker {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::deskewing::{MeasuredScan, MotionWithin};
     use super::super::super::scale::Scale;
     use super::super::super::settings::OdometrySettings;
     use super::*;
     use crate::random::uniform;
-    use nalgebra::Vector6;
 
     /// A scan of a furnished room, in voxels, of which `kind` is the furniture.
     fn scan(kind: u64, settings: &OdometrySettings) -> ThinnedScan {
@@ -225,16 +223,7 @@ mod tests {
             point[i % 3] = if i % 2 == 0 { 2.5 } else { -2.5 };
             [0, 1, 2].map(|k| middle[k] + point[k])
         });
-        let points = walls.chain(boxes).collect();
-        let within = MotionWithin {
-            times: Vec::new(),
-            twist: Vector6::zeros(),
-            since: None,
-            farthest: 1.0,
-            deviation: 1.0,
-            range: 20.0,
-        };
-        ThinnedScan::new(MeasuredScan { points, times: None }, within, settings)
+        ThinnedScan::of_one_moment(walls.chain(boxes).collect(), settings)
     }
 
     #[test]
@@ -261,11 +250,8 @@ mod tests {
         tracker.follow(&first);
         (0..10).for_each(|_| tracker.skip());
         let truth = RigidTransform::from_rotation_vector([0.02, -0.03, 2.0], [3.0, 2.0, 0.5]);
-        let moved = ThinnedScan::new(
-            MeasuredScan { points: truth.inverse().transform_points(&first.points), times: None },
-            tracker.expected_within(),
-            &settings,
-        );
+        let points = truth.inverse().transform_points(&first.points);
+        let moved = ThinnedScan::of_one_moment(points, &settings);
         let (found, _) = tracker.among_keyframes(&moved, None, By::Panorama).unwrap();
         let off = (truth.inverse() * found.T_map_scan).log();
         assert!(off.iter().all(|component| component.abs() < 0.05), "{off:?}");
