@@ -193,7 +193,7 @@ pub(super) fn accepted(
 
 /// The candidate fitted to the scene's own points, which no other instance has taken, and its evidence by the samples that
 /// are free; `None` where hardly any point is near.
-fn refined<'a>(
+pub(super) fn refined<'a>(
     candidate: &Candidate<'a>,
     scene: &Scene<'_>,
     is_taken: &[bool],

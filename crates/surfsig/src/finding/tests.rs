@@ -1,10 +1,15 @@
 //! Instances in a small simulated scene, and what speaks for them against slow references.
 
-use super::evidence::{Evidence, ModelView};
+mod acceptance;
+
+use super::evidence::ModelView;
 use super::rim::Rim;
 use super::samples::mean_length;
 use super::scene::SceneSurface;
 use super::*;
+use crate::random::uniform;
+use crate::spacing::point_spacing;
+use crate::visibility::all_seen_from;
 use crate::{FieldPlaces, PointCloud};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
@@ -235,6 +240,22 @@ fn a_viewpoint_counts_where_all_can_have_been_seen_from_it() {
     let both = prepared(&scan.seen_from([0.0; 3]).facing(&upwards));
     assert!(both.is_oriented && both.viewpoint == given.viewpoint && both.scan.viewpoint.is_none());
 
+    // Noise along the lines of sight, and mixed pixels, hide every eighth point behind others.
+    let noisy: Vec<[f64; 3]> = (0..)
+        .zip(&points)
+        .map(|(i, point)| {
+            let noise = 0.004 * (uniform(i, 1) - 0.5);
+            let mixed = if uniform(i, 2) < 0.2 { 0.08 * uniform(i, 3) } else { 0.0 };
+            point.map(|x| x * (1.0 + noise + mixed))
+        })
+        .collect();
+    assert!(!all_seen_from([0.0; 3], &noisy, point_spacing(&noisy)));
+    let noisy = Scan::new(PointCloud::new_f64(&noisy));
+    assert!(
+        prepared(&noisy.seen_from([0.0; 3])).viewpoint.is_some(),
+        "noise hid the viewpoint of a depth image"
+    );
+
     let whole: Vec<[f64; 3]> = body(3000).into_iter().map(|(point, _)| point).collect();
     let one_view: Vec<[f64; 3]> = whole.iter().copied().filter(|point| point[0] > 0.5).collect();
     let sides = [
@@ -306,68 +327,4 @@ fn what_is_round_is_not_determined_and_a_front_ends_where_nothing_is_beyond() {
         assert!(found.outline_ends > 0.5 && found.outline_goes_on < 0.05, "{found:?}");
         assert!(found.pixels > 200.0 && found.uncovered < 0.05, "{found:?}");
     }
-}
-
-#[test]
-fn rivals_explain_the_same_or_are_elsewhere_and_symmetries_are_none() {
-    let settings = FindSettings::default();
-    let voxel = 0.12;
-    // A brick, which is the same after half a turn about each of its axes, and the uneven body; both in two places.
-    let brick = || {
-        let half: [f64; 3] = [2.0, 1.0, 0.5];
-        let mut all = Vec::new();
-        for axis in 0..3 {
-            let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
-            let count = |k: usize| (2.0 * half[k] / 0.1) as i32;
-            for (i, j) in (0..count(u)).flat_map(|i| (0..count(v)).map(move |j| (i, j))) {
-                for side in [-1.0, 1.0] {
-                    let (mut point, mut normal) = ([0.0; 3], Vector3::zeros());
-                    point[axis] = side * half[axis];
-                    point[u] = (f64::from(i) + 0.5) * 0.1 - half[u];
-                    point[v] = (f64::from(j) + 0.5) * 0.1 - half[v];
-                    normal[axis] = side;
-                    all.push((point, normal));
-                }
-            }
-        }
-        all
-    };
-    let odds_of = |all: Vec<([f64; 3], Vector3<f64>)>| {
-        let at = |x: f64, turn: f64| RigidTransform::from_rotation_vector([0.0, 0.0, turn], [x, 0.0, 0.0]);
-        let twice = all
-            .iter()
-            .flat_map(|&(point, normal)| [0.0, 20.0].map(|x| (at(x, 0.0).transform_point(point), normal)));
-        let scene = surface_of(&model_of(twice.collect()), voxel);
-        let model = model_of(all);
-        let view = ModelView::new(&model, scene, None, usize::MAX, &settings);
-        let sought = Sought::new(0, model, view);
-        // There, a little off, after half a turn, and the copy.
-        let transforms = [at(0.0, 0.0), at(0.05, 0.02), at(0.0, PI), at(20.0, 0.0)];
-        let evidence = [5.0, 4.0, 3.0, 2.0].map(|log_odds| Evidence {
-            support: 0.5,
-            measures: Measures::default(),
-            log_odds,
-            visible: 1.0,
-            overlap: 1.0,
-        });
-        RivalOdds::of(&sought, &transforms, &evidence, &[0, 1, 2, 3])
-    };
-    let brick = odds_of(brick());
-    assert_eq!(brick[0].here, -12.0, "half a turn is a symmetry, the second is the same: {brick:?}");
-    let body = odds_of(body(4000));
-    assert_eq!([body[0].here, body[1].here], [3.0; 2], "the other side lies on the same points: {body:?}");
-    assert_eq!(body[3].here, -12.0, "nothing else is at the copy");
-    // One copy elsewhere is no rival: there may be some.
-    assert!(body.iter().chain(&brick).all(|odds| odds.elsewhere == -12.0));
-}
-
-#[test]
-fn odds_grow_with_the_margin_over_rivals() {
-    let odds =
-        |here: f64, elsewhere: f64| Measures::default().among_rivals(2.0, RivalOdds { here, elsewhere }).1;
-    assert!(odds(-3.0, -3.0) > odds(1.5, -3.0));
-    assert!(odds(-3.0, -6.0) > odds(-3.0, -3.0));
-    assert_eq!(odds(-7.0, -7.0), odds(-12.0, -12.0), "a large margin is enough");
-    let (measures, _) = Measures::default().among_rivals(2.0, RivalOdds { here: 1.0, elsewhere: -12.0 });
-    assert_eq!([measures.own_log_odds, measures.margin_here, measures.margin_elsewhere], [2.0, 1.0, 8.0]);
 }
