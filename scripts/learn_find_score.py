@@ -36,13 +36,15 @@ LEAST = 0.03
 """Probability, by the coefficients that are replaced, of what is learnt from."""
 RIDGE = 0.002
 """Weight of the squared coefficients of standardised terms, so that few examples do not drive them away."""
-SIGNS = (0, 1, -1, -1, -1, 1, 1, 1, -1, -1)
+SIGNS = (0, 1, -1, -1, -1, 1, 1, 1, -1, -1, -1)
 """Of the coefficients, as few examples tell them badly: 1 of what speaks for a pose, -1 of what speaks
 against it, 0 of both."""
 SIGNS_AMONG_RIVALS = (0, 1, 1, 1)
 """The same of the coefficients by which rivals count."""
 NOT_SHOWN = 3
 """Objects that are not in the scene and are looked for, too; each counts as many as are not there."""
+STRETCH = 1.2
+"""Of objects that are looked for, too, and are not in the scene: others of nearly the shape of one that is."""
 OF_COPIES = 3.0
 """What an instance in a scene of half hidden copies counts: there are fewer of them."""
 NOISES = (2e-4, 1e-3)
@@ -75,6 +77,7 @@ def terms(measures: dict[str, float]) -> list[float]:
         measures["outline_ends"],
         measures["outline_goes_on"],
         np.log(measures["uncovered"] + 0.02),
+        np.log(measures["misfit"] + 0.005),
     ]
 
 
@@ -100,6 +103,13 @@ def fitted(x: Array, y: Array, weight: Array, signs: tuple[int, ...]) -> Array:
     w = minimize(loss, np.zeros(x.shape[1]), jac=True, method="L-BFGS-B", bounds=bounds).x / deviation
     w[0] -= w @ mean
     return np.asarray(w)
+
+
+def stretched(cloud: surfsig.PointCloud, rng: np.random.Generator) -> surfsig.PointCloud:
+    """Give points of an object that is longer in one direction, without their normals."""
+    direction = rng.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    return surfsig.PointCloud(cloud.points + (STRETCH - 1.0) * np.outer(cloud.points @ direction, direction))
 
 
 def examples(seeds: list[int]) -> Examples:

@@ -246,6 +246,8 @@ impl<'a> ModelView<'a> {
         let on = || (0..moved.len()).filter(|&sample| is_touching[sample]);
         let front = seen.and_then(|seen| seen.front).unwrap_or_default();
         let of = |count: u32, all: u32| f64::from(count) / f64::from(all.max(1));
+        let (agreement, misfit) =
+            self.agreement_and_misfit(on().filter_map(|sample| Some((&moved[sample], nearest[sample]?))));
         let told = front.confirmed + front.mismatched + front.contradicted + front.missing;
         let measures = Measures {
             front_confirmed: of(front.confirmed, front.facing),
@@ -265,7 +267,8 @@ impl<'a> ModelView<'a> {
             contradicted: f64::from(judgement.contradicted) / self.most_seen,
             mismatched: f64::from(judgement.mismatched) / self.most_seen,
             missing: f64::from(judgement.missing) / self.most_seen,
-            agreement: self.agreement(on().filter_map(|sample| Some((&moved[sample], nearest[sample]?)))),
+            agreement,
+            misfit,
             going_on: self.rim.going_on(transform, &is_touching, &self.scene, is_free),
             roundness: normal_spread(on().map(|sample| &self.samples[sample].normal)),
             resolution: self.reach / self.scene.voxel,
@@ -294,21 +297,28 @@ impl<'a> ModelView<'a> {
         relative.symmetric_eigenvalues().min().max(0.0)
     }
 
-    /// Mean agreement in residual and normal of pairs of a sample and the scene's near it: 1 on the same surface.
-    fn agreement<'b>(&self, pairs: impl Iterator<Item = (&'b SurfacePlace, usize)>) -> f64 {
+    /// Mean agreement in residual and normal of pairs of a sample and the scene's near it, 1 on the same surface, and
+    /// [`Measures::misfit`].
+    fn agreement_and_misfit<'b>(&self, pairs: impl Iterator<Item = (&'b SurfacePlace, usize)>) -> (f64, f64) {
         let touching = (self.settings.touching_distance * self.scene.voxel) as f32;
-        let (mut sum, mut count) = (0.0, 0.0);
+        let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
         for (sample, near) in pairs {
             let near = &self.scene.samples()[near];
             let gap = [0, 1, 2].map(|k| near.place[k] - sample.place[k]);
-            let residual = dot(&gap, &near.normal) / touching;
+            let distance = dot(&gap, &near.normal);
+            let residual = distance / touching;
             let cosine = dot(&sample.normal, &near.normal);
             let agreement =
                 (1.0 - residual * residual).max(0.0) * ((cosine - ALIKE) / (1.0 - ALIKE)).max(0.0);
             sum += f64::from(agreement);
+            squares += f64::from(distance * distance);
             count += 1.0;
         }
-        if count > 0.0 { sum / count } else { 0.0 }
+        if count == 0.0 {
+            return (0.0, 0.0);
+        }
+        let beyond_noise = (squares / count - self.scene.noise * self.scene.noise).max(0.0).sqrt();
+        (sum / count, beyond_noise * REACH / self.reach)
     }
 }
 

@@ -28,6 +28,8 @@ pub struct Measures {
     pub missing: f64,
     /// Mean agreement in residual and normal of what lies on the scene, 0 to 1.
     pub agreement: f64,
+    /// Root mean square residual of what lies on the scene, beyond the scene's noise, over the model's extent.
+    pub misfit: f64,
     /// Share of the model's rim where the scene goes on beyond it.
     pub going_on: f64,
     /// Spread of the normals that lie on the scene: 1 less the largest eigenvalue of their second moments.
@@ -62,7 +64,7 @@ pub struct Measures {
     /// By how much it is above that of the best other transform that explains the same part of the scene, symmetries of the
     /// model left out.
     pub margin_here: f64,
-    /// The same of the fifth best transform elsewhere.
+    /// The same of the best transform of the fifth best other part of the scene.
     pub margin_elsewhere: f64,
 }
 
@@ -104,7 +106,7 @@ impl Measures {
     /// let measures = surfsig::Measures { support: 0.5, ..Default::default() };
     /// assert_eq!(measures.named()[0], ("support", 0.5));
     /// ```
-    pub fn named(&self) -> [(&'static str, f64); 23] {
+    pub fn named(&self) -> [(&'static str, f64); 24] {
         [
             ("support", self.support),
             ("confirmed", self.confirmed),
@@ -113,6 +115,7 @@ impl Measures {
             ("mismatched", self.mismatched),
             ("missing", self.missing),
             ("agreement", self.agreement),
+            ("misfit", self.misfit),
             ("going_on", self.going_on),
             ("roundness", self.roundness),
             ("resolution", self.resolution),

@@ -35,7 +35,7 @@ const NO_RIVAL: f64 = -12.0;
 pub(super) struct RivalOdds {
     /// Of the best other transform that explains the same part of the scene, but for symmetries of the model.
     pub here: f64,
-    /// Of the fifth best that explains other parts: the model may be there more than once.
+    /// Of the best one of the fifth best other part of the scene: the model may be there more than once.
     pub elsewhere: f64,
 }
 
@@ -48,21 +48,28 @@ impl RivalOdds {
         numbers: &[usize],
     ) -> Vec<Self> {
         let compared = Compared::new(sought, transforms);
-        let rivals: Vec<usize> =
+        let mut rivals: Vec<usize> =
             (0..transforms.len()).filter(|&number| evidence[number].log_odds > NO_RIVAL).collect();
+        rivals.sort_by(|&a, &b| evidence[b].log_odds.total_cmp(&evidence[a].log_odds));
+        let on_scene: Vec<Vec<&SurfacePlace>> =
+            (0..transforms.len()).into_par_iter().map(|number| compared.on_scene(number)).collect();
+        let explain_the_same =
+            |one: usize, other: usize| compared.explain_the_same(&on_scene[one], one, other);
         let of = |&one: &usize| {
-            let (mut here, mut elsewhere) = (NO_RIVAL, Vec::new());
-            let on_scene = compared.on_scene(one);
+            let (mut here, mut elsewhere) = (None, Vec::new());
             for &other in rivals.iter().filter(|&&other| !compared.are_one(one, other)) {
-                let odds = evidence[other].log_odds;
-                if !compared.explain_the_same(&on_scene, one, other) {
-                    elsewhere.push(odds);
-                } else if odds > here && !compared.is_symmetry(one, other) {
-                    here = odds;
+                if explain_the_same(one, other) {
+                    if here.is_none() && !compared.is_symmetry(one, other) {
+                        here = Some(other);
+                    }
+                } else if elsewhere.len() < ELSEWHERE
+                    && !elsewhere.iter().any(|&better| explain_the_same(better, other))
+                {
+                    elsewhere.push(other);
                 }
             }
-            elsewhere.sort_by(|a, b| b.total_cmp(a));
-            Self { here, elsewhere: elsewhere.get(ELSEWHERE - 1).copied().unwrap_or(NO_RIVAL) }
+            let odds = |rival: Option<usize>| rival.map_or(NO_RIVAL, |number| evidence[number].log_odds);
+            Self { here: odds(here), elsewhere: odds(elsewhere.get(ELSEWHERE - 1).copied()) }
         };
         numbers.par_iter().map(of).collect()
     }

@@ -19,11 +19,13 @@ pub(super) struct SceneSurface {
     pub voxel: f64,
     /// Between the points of the scan.
     pub spacing: f64,
+    /// Standard deviation of a scan's point from its surface.
+    pub noise: f64,
 }
 
 impl SceneSurface {
-    pub fn new(samples: Vec<SurfacePlace>, voxel: f64, spacing: f64) -> Self {
-        Self { surface: OrientedSurface::new(samples), voxel, spacing }
+    pub fn new(samples: Vec<SurfacePlace>, voxel: f64, spacing: f64, noise: f64) -> Self {
+        Self { surface: OrientedSurface::new(samples), voxel, spacing, noise }
     }
 
     pub fn samples(&self) -> &[SurfacePlace] {
@@ -142,7 +144,7 @@ impl<'a> Scene<'a> {
             return Ok(Arc::clone(known));
         }
         let samples = self.samples(voxel)?;
-        let surface = Arc::new(SceneSurface::new(samples.points.clone(), voxel, self.spacing));
+        let surface = Arc::new(SceneSurface::new(samples.points.clone(), voxel, self.spacing, samples.noise));
         self.surfaces.push((voxel, Arc::clone(&surface)));
         Ok(surface)
     }
@@ -152,8 +154,9 @@ impl<'a> Scene<'a> {
         if let Some((_, known)) = self.surfaces.iter().find(|(of, _)| *of == coarse) {
             return Ok(Arc::clone(known));
         }
-        let surface =
-            Arc::new(SceneSurface::new(thinned(&self.samples(voxel)?.points, coarse), coarse, self.spacing));
+        let samples = self.samples(voxel)?;
+        let points = thinned(&samples.points, coarse);
+        let surface = Arc::new(SceneSurface::new(points, coarse, self.spacing, samples.noise));
         self.surfaces.push((coarse, Arc::clone(&surface)));
         Ok(surface)
     }
