@@ -40,6 +40,13 @@ impl OrientedSurface {
         found.map(|(number, _)| number as usize)
     }
 
+    /// The numbers of the points up to a distance from a place, in ascending order.
+    pub fn within(&self, place: [f64; 3], distance: f64) -> Vec<u32> {
+        let mut found = Vec::new();
+        self.tree.within(place, distance, &mut found);
+        found
+    }
+
     /// The transforms of a source fitted to this surface by point to plane: a step for each of the largest distances
     /// between correspondences. Motions that the correspondences do not determine are not made.
     ///

@@ -22,6 +22,8 @@ const REACH: f64 = 1.2;
 const CELL: f64 = 0.5;
 /// Half the diagonal of a cell, in its edge: the farthest that a model's middle is from that of its cell.
 const HALF_DIAGONAL: f64 = 0.87;
+/// Samples in a row, next to each other, whose residuals are compared.
+const NEIGHBORS: usize = 8;
 /// Directions from which it is tried how much of a model can be seen at once.
 const VIEWS: usize = 100;
 
@@ -299,9 +301,12 @@ impl<'a> ModelView<'a> {
 
     /// Mean agreement in residual and normal of pairs of a sample and the scene's near it, 1 on the same surface, and
     /// [`Measures::misfit`].
-    fn agreement_and_misfit<'b>(&self, pairs: impl Iterator<Item = (&'b SurfacePlace, usize)>) -> (f64, f64) {
+    fn agreement_and_misfit<'b>(
+        &self,
+        pairs: impl Iterator<Item = (&'b SurfacePlace, usize)>,
+    ) -> (f64, f64) {
         let touching = (self.settings.touching_distance * self.scene.voxel) as f32;
-        let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
+        let (mut sum, mut distances) = (0.0, Vec::new());
         for (sample, near) in pairs {
             let near = &self.scene.samples()[near];
             let gap = [0, 1, 2].map(|k| near.place[k] - sample.place[k]);
@@ -311,15 +316,25 @@ impl<'a> ModelView<'a> {
             let agreement =
                 (1.0 - residual * residual).max(0.0) * ((cosine - ALIKE) / (1.0 - ALIKE)).max(0.0);
             sum += f64::from(agreement);
-            squares += f64::from(distance * distance);
-            count += 1.0;
+            distances.push(f64::from(distance));
         }
-        if count == 0.0 {
-            return (0.0, 0.0);
-        }
-        let beyond_noise = (squares / count - self.scene.noise * self.scene.noise).max(0.0).sqrt();
-        (sum / count, beyond_noise * REACH / self.reach)
+        let agreement = sum / distances.len().max(1) as f64;
+        (agreement, shared_part(&distances) * REACH / self.reach)
     }
+}
+
+/// Standard deviation of that part of residuals which neighbours have in common: noise of the sensor differs from one to
+/// the next. The residuals come in an order in which neighbours follow each other.
+fn shared_part(residuals: &[f64]) -> f64 {
+    let (mut sum, mut pairs) = (0.0, 0.0);
+    for neighbors in residuals.chunks_exact(NEIGHBORS) {
+        let total: f64 = neighbors.iter().sum();
+        let squares: f64 = neighbors.iter().map(|residual| residual * residual).sum();
+        // The products of all pairs: their mean has no part of independent noise.
+        sum += total * total - squares;
+        pairs += (NEIGHBORS * (NEIGHBORS - 1)) as f64;
+    }
+    if pairs > 0.0 { (sum / pairs).max(0.0).sqrt() } else { 0.0 }
 }
 
 /// See [`ModelView::to_motions`].

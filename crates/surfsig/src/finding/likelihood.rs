@@ -28,7 +28,7 @@ pub struct Measures {
     pub missing: f64,
     /// Mean agreement in residual and normal of what lies on the scene, 0 to 1.
     pub agreement: f64,
-    /// Root mean square residual of what lies on the scene, beyond the scene's noise, over the model's extent.
+    /// Standard deviation of the residuals that neighbours on the scene share, as noise does not, over the model's extent.
     pub misfit: f64,
     /// Share of the model's rim where the scene goes on beyond it.
     pub going_on: f64,

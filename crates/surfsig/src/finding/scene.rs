@@ -19,13 +19,11 @@ pub(super) struct SceneSurface {
     pub voxel: f64,
     /// Between the points of the scan.
     pub spacing: f64,
-    /// Standard deviation of a scan's point from its surface.
-    pub noise: f64,
 }
 
 impl SceneSurface {
-    pub fn new(samples: Vec<SurfacePlace>, voxel: f64, spacing: f64, noise: f64) -> Self {
-        Self { surface: OrientedSurface::new(samples), voxel, spacing, noise }
+    pub fn new(samples: Vec<SurfacePlace>, voxel: f64, spacing: f64) -> Self {
+        Self { surface: OrientedSurface::new(samples), voxel, spacing }
     }
 
     pub fn samples(&self) -> &[SurfacePlace] {
@@ -34,16 +32,14 @@ impl SceneSurface {
 
     /// What the sensor saw around a point, about that point. `is_free` says which samples may confirm a model.
     pub fn image(&self, middle: [f64; 3], reach: f64, viewpoint: [f64; 3], is_free: &[bool]) -> DepthImage {
-        let (mut near, mut free) = (Vec::new(), Vec::new());
         let center = middle.map(|x| x as f32);
-        let farthest = (4.0 * reach * reach) as f32;
-        for (sample, &is_free) in self.samples().iter().zip(is_free) {
-            let place = [0, 1, 2].map(|k| sample.place[k] - center[k]);
-            if place[0] * place[0] + place[1] * place[1] + place[2] * place[2] <= farthest {
-                near.push(SurfacePlace { place, normal: sample.normal });
-                free.push(is_free);
-            }
-        }
+        let numbers = self.surface.within(middle, 2.0 * reach);
+        let about_middle = |&number: &u32| {
+            let sample = &self.samples()[number as usize];
+            SurfacePlace { place: [0, 1, 2].map(|k| sample.place[k] - center[k]), normal: sample.normal }
+        };
+        let near: Vec<SurfacePlace> = numbers.iter().map(about_middle).collect();
+        let free: Vec<bool> = numbers.iter().map(|&number| is_free[number as usize]).collect();
         let from = [0, 1, 2].map(|k| viewpoint[k] - middle[k]);
         DepthImage::new(&near, &free, from, self.voxel, reach, None)
     }
@@ -144,7 +140,7 @@ impl<'a> Scene<'a> {
             return Ok(Arc::clone(known));
         }
         let samples = self.samples(voxel)?;
-        let surface = Arc::new(SceneSurface::new(samples.points.clone(), voxel, self.spacing, samples.noise));
+        let surface = Arc::new(SceneSurface::new(samples.points.clone(), voxel, self.spacing));
         self.surfaces.push((voxel, Arc::clone(&surface)));
         Ok(surface)
     }
@@ -154,9 +150,8 @@ impl<'a> Scene<'a> {
         if let Some((_, known)) = self.surfaces.iter().find(|(of, _)| *of == coarse) {
             return Ok(Arc::clone(known));
         }
-        let samples = self.samples(voxel)?;
-        let points = thinned(&samples.points, coarse);
-        let surface = Arc::new(SceneSurface::new(points, coarse, self.spacing, samples.noise));
+        let points = thinned(&self.samples(voxel)?.points, coarse);
+        let surface = Arc::new(SceneSurface::new(points, coarse, self.spacing));
         self.surfaces.push((coarse, Arc::clone(&surface)));
         Ok(surface)
     }
