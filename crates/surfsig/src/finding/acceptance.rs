@@ -84,11 +84,11 @@ impl Candidate<'_> {
         self.sought.view.judged(&[self.T_scene_model], is_free)[0]
     }
 
-    /// Evidence with what rivals say, too. Where free space is not known they count for nothing: it was not learnt how much
-    /// they would.
+    /// Evidence with what rivals say, too.
     fn among_rivals(&self, own: Evidence) -> Evidence {
-        let (measures, among_rivals) = own.measures.among_rivals(own.log_odds, self.rivals);
-        let log_odds = if self.sought.view.viewpoint.is_some() { among_rivals } else { own.log_odds };
+        let is_free_space_known = self.sought.view.viewpoint.is_some();
+        let (measures, log_odds) =
+            own.measures.among_rivals(own.log_odds, self.rivals, is_free_space_known);
         Evidence { measures, log_odds, ..own }
     }
 }

@@ -81,17 +81,22 @@ const TERMS_OF_SAMPLES: usize = 8;
 /// right. They choose which transforms are judged by all measures.
 const COEFFICIENTS_OF_SAMPLES: [f64; TERMS_OF_SAMPLES] =
     [-2.87, 2.04, 1.86, -32.29, -8.12, 1.17, -25.52, 4.4];
-/// Constant, and coefficients of the logarithm of the odds by a transform's own evidence, of `margin_here` and of
-/// `margin_elsewhere`, from 307 instances in 15 cluttered scenes and 30 of half hidden copies, of which 162 are right. Left
-/// out scene by scene, 113 of 118 with a probability above 0.9 were right, 28 of 32 from 0.7 on; of the 70 right ones in
-/// clutter 50 were found at a precision of 0.95, without rivals 23 (`scripts/learn_find_score.py`).
-const COEFFICIENTS_AMONG_RIVALS: [f64; 4] = [-2.84, 1.20, 0.50, 0.07];
+/// Terms of the one of all measures, of rivals and of the residuals that neighbours share.
+const TERMS_AMONG_RIVALS: usize = TERMS + 3;
+/// Their coefficients. TODO
+const COEFFICIENTS_AMONG_RIVALS: [f64; TERMS_AMONG_RIVALS] = [0.0; TERMS_AMONG_RIVALS];
+/// Terms of the one where nobody knows what the sensor saw through.
+const TERMS_WITHOUT_FREE_SPACE: usize = 7;
+/// Their coefficients. TODO
+const COEFFICIENTS_WITHOUT_FREE_SPACE: [f64; TERMS_WITHOUT_FREE_SPACE] = [0.0; TERMS_WITHOUT_FREE_SPACE];
 /// A margin beyond which more says no more.
 const LARGE_MARGIN: f64 = 8.0;
 /// Spread of normals from which on they are more than a plane: it counts no more.
 const ROUND: f64 = 0.1;
 /// What is added to a constraint before its logarithm is taken: less is next to none.
 const NO_CONSTRAINT: f64 = 0.003;
+/// The same of a misfit: noise leaves as much.
+const NO_MISFIT: f64 = 0.005;
 /// The same of what nothing hides.
 const FEW_UNCOVERED: f64 = 0.02;
 /// What is added to a number of pixels before its logarithm is taken: fewer are next to nothing.
@@ -172,14 +177,41 @@ impl Measures {
         sum_of_products(&self.terms(), &COEFFICIENTS)
     }
 
+    fn terms_among_rivals(&self) -> [f64; TERMS_AMONG_RIVALS] {
+        let mut terms = [0.0; TERMS_AMONG_RIVALS];
+        terms[..TERMS].copy_from_slice(&self.terms());
+        terms[TERMS..].copy_from_slice(&[
+            (self.misfit + NO_MISFIT).ln(),
+            self.margin_here,
+            self.margin_elsewhere,
+        ]);
+        terms
+    }
+
+    fn terms_without_free_space(&self) -> [f64; TERMS_WITHOUT_FREE_SPACE] {
+        [
+            1.0,
+            self.own_log_odds,
+            self.margin_here,
+            self.margin_elsewhere,
+            self.going_on,
+            (self.misfit + NO_MISFIT).ln(),
+            (self.constraint + NO_CONSTRAINT).ln(),
+        ]
+    }
+
     /// The same measures with the margins over rivals, whose logarithms of the odds are given, and the logarithm of the odds
-    /// that the transform is right by both; `own` is that by its own evidence.
-    pub(super) fn among_rivals(&self, own: f64, rivals: RivalOdds) -> (Self, f64) {
+    /// that the transform is right by all; `own` is that by its own evidence.
+    pub(super) fn among_rivals(&self, own: f64, rivals: RivalOdds, is_free_space_known: bool) -> (Self, f64) {
         let margin = |rival: f64| (own - rival).clamp(-LARGE_MARGIN, LARGE_MARGIN);
         let [margin_here, margin_elsewhere] = [rivals.here, rivals.elsewhere].map(margin);
-        let terms = [1.0, own, margin_here, margin_elsewhere];
-        let log_odds = sum_of_products(&terms, &COEFFICIENTS_AMONG_RIVALS);
-        (Self { own_log_odds: own, margin_here, margin_elsewhere, ..*self }, log_odds)
+        let all = Self { own_log_odds: own, margin_here, margin_elsewhere, ..*self };
+        let log_odds = if is_free_space_known {
+            sum_of_products(&all.terms_among_rivals(), &COEFFICIENTS_AMONG_RIVALS)
+        } else {
+            sum_of_products(&all.terms_without_free_space(), &COEFFICIENTS_WITHOUT_FREE_SPACE)
+        };
+        (all, log_odds)
     }
 
     /// The same without the front and the outline, of which few samples give no picture.
