@@ -19,7 +19,7 @@ _EDGE = 0.05
 
 @dataclass(frozen=True)
 class Lidar:
-    """A spinning lidar, whose axis is its z axis. Angles are in degrees, lengths in metres.
+    """A lidar that turns about its z axis. Angles are in degrees, lengths in metres.
 
     Parameters
     ----------
@@ -28,13 +28,15 @@ class Lidar:
     elevation
         Of the lowest and the highest laser.
     steps
-        Directions in a turn.
+        Directions from the first to the last.
     noise
         Standard deviation of a measured range.
     max_range
         Beyond, nothing is measured.
     dropout
         Share of the returns that are lost, by chance.
+    view
+        Angle of all its directions, half of it to either side of its x axis; a whole turn by default.
     """
 
     lines: int = 32
@@ -43,6 +45,7 @@ class Lidar:
     noise: float = 0.01
     max_range: float = 100.0
     dropout: float = 0.0
+    view: float = 360.0
 
     def rays(self, line_errors: ArrayLike = 0.0) -> Array:
         """Give unit vectors in the sensor's axes, (lines * steps, 3), one line after the other.
@@ -53,9 +56,10 @@ class Lidar:
             Radians by which each laser looks higher than the even spread says, (lines,).
         """
         low, high = np.radians(self.elevation)
+        view = np.radians(self.view)
         elevation, azimuth = np.meshgrid(
             np.linspace(low, high, self.lines) + np.asarray(line_errors, np.float64),
-            np.arange(self.steps) / self.steps * 2.0 * np.pi - np.pi,
+            np.arange(self.steps) / self.steps * view - view / 2.0,
             indexing="ij",
         )
         flat = np.cos(elevation)
@@ -220,7 +224,7 @@ def scan_moving(
     sensor
         The lidar; all its lasers fire at once.
     poses
-        (steps, 4, 4), T_scene_sensor at each of its directions, from behind counter-clockwise to behind.
+        (steps, 4, 4), T_scene_sensor at each direction, counter-clockwise: a whole turn begins behind.
     seed
         Of noise and dropouts; the same seed gives the same scan.
     period
