@@ -204,7 +204,8 @@ def scan(
     ranges = hits.t
     if calibration is not None:
         width = sensor.steps if isinstance(sensor, Lidar) else sensor.width
-        ranges = _mixed(ranges, hits.surface, width, wrong.mixed, rng)
+        is_turn = isinstance(sensor, Lidar) and sensor.view == 360.0
+        ranges = _mixed(ranges, hits.surface, width, is_turn, wrong.mixed, rng)
         cosine = np.abs(np.einsum("ni,ni->n", directions, hits.normals))
         ranges = ranges * (1.0 + wrong.range_scale) + wrong.incidence * (1.0 - cosine)
     deviation = sensor.noise * (1.0 if is_lidar else hits.t[met] ** 2)
@@ -271,9 +272,17 @@ def _drawn(
 
 
 def _mixed(
-    ranges: Array, surface: NDArray[np.int32], width: int, share: float, rng: np.random.Generator
+    ranges: Array,
+    surface: NDArray[np.int32],
+    width: int,
+    is_turn: bool,
+    share: float,
+    rng: np.random.Generator,
 ) -> Array:
-    """Mix a share of the returns with those of the next ray of the line, where another surface lies apart."""
+    """Mix a share of the returns with those of the next ray of the line, where another surface lies apart.
+
+    After the last ray of a line the first one comes if the line is a whole turn, and none otherwise.
+    """
     rows, surfaces = ranges.reshape(-1, width), surface.reshape(-1, width)
     following = np.roll(rows, -1, axis=1)
     drawn, part = rng.random(rows.shape), rng.random(rows.shape)
@@ -281,6 +290,7 @@ def _mixed(
         is_other = surfaces != np.roll(surfaces, -1, axis=1)
         apart = is_other & (np.abs(following - rows) > _EDGE * np.minimum(rows, following))
         is_mixed = apart & np.isfinite(rows) & np.isfinite(following) & (drawn < share)
+        is_mixed[:, -1] &= is_turn
         mixed = np.where(is_mixed, rows + part * (following - rows), rows)
     return np.asarray(mixed.reshape(-1))
 
