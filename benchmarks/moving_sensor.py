@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,33 +14,7 @@ from surfsig import simulate
 
 Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class Lidar:
-    """Rings and steps of a sensor that looks along its x axis; angles in radians, lengths in metres."""
-
-    rings: int = 32
-    steps: int = 480
-    elevation: float = np.radians(40.0)
-    """Of the highest ring; the lowest looks as far down."""
-    azimuth: float = 2.0 * np.pi
-    """From the first to the last step."""
-    noise: float = 0.01
-    """Standard deviation of a measured distance."""
-
-    def rays(self) -> Array:
-        """Give unit vectors, (rings * steps, 3)."""
-        elevation, azimuth = np.meshgrid(
-            np.linspace(-self.elevation, self.elevation, self.rings),
-            (np.arange(self.steps) / self.steps - 0.5) * self.azimuth,
-            indexing="ij",
-        )
-        flat = np.cos(elevation)
-        rays = [flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)]
-        return np.stack(rays, axis=-1).reshape(-1, 3)
-
-
-LIDAR = Lidar()
+LIDAR = simulate.Lidar(elevation=(-40.0, 40.0))
 
 HEIGHT = 3.0
 # Walls: lowest and highest corner on the floor.
@@ -105,11 +78,12 @@ def way(count: int, places: Sequence[tuple[float, float]] = WAY) -> Array:
     return poses
 
 
-def scan(scene: simulate.Scene, pose: Array, seed: int, lidar: Lidar = LIDAR) -> surfsig.PointCloud:
+def scan(scene: simulate.Scene, pose: Array, seed: int, lidar: simulate.Lidar = LIDAR) -> surfsig.PointCloud:
     """Scan from a pose T_building_sensor; in the sensor's own frame, in metres, float32."""
+    # `simulate.scan` would draw other noise: tables and tests are of these scans.
     rays = lidar.rays()
     hits = scene.cast(np.broadcast_to(pose[:3, 3], rays.shape), rays @ pose[:3, :3].T)
-    met = np.isfinite(hits.t)
+    met = hits.t < lidar.max_range
     distances = hits.t[met] + np.random.default_rng([9, seed]).normal(0.0, lidar.noise, met.sum())
     points = (distances[:, None] * rays[met]).astype(np.float32)
     return surfsig.PointCloud(points, viewpoint=np.zeros(3))

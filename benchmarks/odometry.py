@@ -13,13 +13,14 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import moving_sensor
 import numpy as np
 from machine import measured_here
-from moving_sensor import Array, Lidar
+from moving_sensor import LIDAR, Array
 from numpy.typing import NDArray
 from peers import HERE, PeerUnavailable, peer_python, run_json
 from report import Row, markdown_table, measured_on, publish
@@ -29,12 +30,12 @@ import surfsig
 from surfsig import simulate
 
 SENSORS = {
-    "lidar, 32 rings": (Lidar(), 110),
-    "the same, noise 30 mm": (Lidar(noise=0.03), 110),
-    "the same, every 0.5 m": (Lidar(), 48),
-    "lidar, 16 rings, 30° high": (Lidar(16, 900, np.radians(15.0), noise=0.02), 110),
-    "lidar, 8 rings": (Lidar(8, 360, np.radians(30.0)), 110),
-    "camera, 90° x 60°": (Lidar(96, 160, np.radians(30.0), np.radians(90.0), 0.005), 110),
+    "lidar, 32 rings": (LIDAR, 110),
+    "the same, noise 30 mm": (replace(LIDAR, noise=0.03), 110),
+    "the same, every 0.5 m": (LIDAR, 48),
+    "lidar, 16 rings, 30° high": (simulate.Lidar(16, (-15.0, 15.0), 900, noise=0.02), 110),
+    "lidar, 8 rings": (simulate.Lidar(8, (-30.0, 30.0), 360), 110),
+    "camera, 90° x 60°": (simulate.Lidar(96, (-30.0, 30.0), 160, noise=0.005, view=90.0), 110),
 }
 WAY_COLUMNS = (
     "sensor", "scans", "points each", "tracked", "largest error of place", "of the way", "of direction",
@@ -79,7 +80,7 @@ def main() -> None:
     publish(text, "python benchmarks/odometry.py --write", arguments.write)
 
 
-def follow(name: str, lidar: Lidar, count: int) -> Row:
+def follow(name: str, lidar: simulate.Lidar, count: int) -> Row:
     """Follow a sensor on its way, and return a row of the first table."""
     scene, true = moving_sensor.building(1), moving_sensor.way(count)
     scans = [moving_sensor.scan(scene, pose, seed, lidar) for seed, pose in enumerate(true)]
@@ -129,7 +130,7 @@ def peer_versions() -> dict[str, str]:
     return {name: str(text) for name, text in answer.items()}
 
 
-def carry_away(seed: int, lidar: Lidar) -> NDArray[np.int64]:
+def carry_away(seed: int, lidar: simulate.Lidar) -> NDArray[np.int64]:
     """Carry the sensor to places after its way, and count these: all, found right, wrong, and lost, (3, 4).
 
     A place counts as wrong where any scan has a wrong pose, and as found where any has one.

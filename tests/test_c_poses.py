@@ -165,3 +165,16 @@ def test_points_with_times_are_deskewed_as_in_python(c: CInterface) -> None:
         np.testing.assert_allclose(np.array(twist[:]) / interval, expected.twists[2], rtol=1e-6, atol=1e-9)
     finally:
         f.surfsig_odometry_free(made)
+
+
+def test_a_scan_is_deskewed_as_in_python(c: CInterface) -> None:
+    scan = moving_scans(1)[0][0]
+    points, seconds = scan.points.astype(np.float64), scan.fields["time"].astype(np.float64)
+    twist = np.array([0.1, -0.2, 1.2, 1.5, 0.3, -0.1])
+    expected = surfsig.deskew(PointCloud(points), twist, times=seconds)
+    moved = np.empty_like(points)
+    pointers = [values.ctypes.data_as(POINTER(c_double)) for values in (seconds, twist, moved)]
+    with c.cloud_of(points) as cloud:
+        c.check(c.functions.surfsig_deskew(cloud, *pointers))
+    np.testing.assert_array_equal(moved, expected.points)
+    assert np.abs(moved - points).max() > 0.05

@@ -102,6 +102,10 @@ int main() {
   std::printf("%g %g %g, %g %g %g, %g\\n", moved[0], moved[1], moved[2], back[0], back[1], back[2],
               rotated[1]);
   std::printf("%.3f %.3f\\n", surfsig::Isometry::exp(quarter.log()).data()[1], quarter.adjoint()[6]);
+
+  const std::vector<double> times(cloud.size(), 2.0);
+  const auto straight = surfsig::deskew(cloud, times, {{0.0, 0.0, 0.0, 0.25, 0.0, 0.0}});
+  std::printf("%zu %.2f %.2f\\n", straight.size(), straight[1][0], straight[1][2]);
 }
 """
 
@@ -137,7 +141,7 @@ def lattice_points_within(steps: float) -> int:
 
 @pytest.mark.parametrize("standard", ["c++14", "c++20"])
 def test_a_program_in_cpp(installed: Path, tmp_path: Path, standard: str) -> None:
-    one, none, refused, counts, own, alike, thrown, plane, kept, flat, moved, back = output_of(
+    one, none, refused, counts, own, alike, thrown, plane, kept, flat, moved, back, straight = output_of(
         tmp_path / "main.cpp", IN_CPP, installed, "c++", standard
     )
     assert one == f"1 {lattice_points_within(5.5)} 1.000"
@@ -153,6 +157,7 @@ def test_a_program_in_cpp(installed: Path, tmp_path: Path, standard: str) -> Non
     # A quarter turn about z and a translation, twice.
     assert moved == "-2 3 6, 1 0 0, 1"
     assert back == "-1.000 1.000"
+    assert straight == "900 0.60 3.00"
 
 
 def built(installed: Path, folder: Path, target: str) -> Path:

@@ -2,7 +2,11 @@
 
 import dataclasses
 import inspect
+import signal
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -153,3 +157,37 @@ def test_what_has_not_begun_is_not_begun_where_the_work_stops() -> None:
     with pytest.raises(KeyError, match="the first"):
         map_in_threads(work, range(10_000), 2)
     assert len(begun) < 10_000
+
+
+@pytest.mark.skipif(not hasattr(signal, "alarm"), reason="no fork here")
+def test_no_call_leaves_threads_that_a_forked_child_waits_for() -> None:
+    script = """
+import os, signal, sys
+import numpy as np, surfsig
+from surfsig import simulate, spacing
+sys.path.insert(0, sys.argv[1])
+from test_progress_and_threads import CALLS, POINTS
+lidar = simulate.Lidar(lines=32, steps=480)
+scan = simulate.scan(simulate.room(1), lidar, simulate.upright_pose(0, 0, 1.2, 0))
+others = {
+    "deskew": lambda: surfsig.deskew(scan, np.full(6, 0.1), spin_rate=10.0),
+    "estimate_odometry": lambda: surfsig.estimate_odometry([scan, scan]),
+    "estimate_viewpoint": lambda: surfsig.estimate_viewpoint(scan),
+    "point_spacing": lambda: spacing.point_spacing(scan.points),
+    "join_surface_pieces": lambda: surfsig._surfsig.join_surface_pieces([], []),
+    "signatures": lambda: surfsig.extract(POINTS, 0.2).signatures(),
+}
+for name, call in (CALLS | others).items():
+    call()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(20)
+        call()
+        os._exit(0)
+    print(name, os.waitpid(child, 0)[1])
+"""
+    command = [sys.executable, "-W", "ignore", "-c", script, str(Path(__file__).parent)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    ended = dict(line.split() for line in done.stdout.splitlines())
+    assert ended.keys() > CALLS.keys()
+    assert {name for name, code in ended.items() if code != "0"} == set()

@@ -28,7 +28,7 @@ from surfsig.clean import crop, downsample, remove_outliers
 from surfsig.coordinate_system import CoordinateSystem, GeoKeys
 from surfsig.curvature import extract, extract_radii
 from surfsig.errors import FileFormatError, InvalidInputError, SurfsigError
-from surfsig.extraction import Extraction, FitUsed, Status
+from surfsig.extraction import Extraction
 from surfsig.field import (
     FieldMatches,
     FieldSignatures,
@@ -99,6 +99,7 @@ from surfsig.shapes import (
     fit_torus,
 )
 from surfsig.signature_similarity import flip_signatures, similarity, similarity_class, similarity_matrix
+from surfsig.status import FitUsed, Status
 from surfsig.surfaces import (
     PipeJoint,
     PipeRun,

@@ -20,11 +20,12 @@ from surfsig.arguments import (
 )
 from surfsig.defaults import AXES, FIT, Axes, Fit
 from surfsig.errors import InvalidInputError
-from surfsig.extraction import Extraction, Status
+from surfsig.extraction import Extraction
 from surfsig.orientation import orientation
 from surfsig.places import places
 from surfsig.point_cloud import PointCloud
 from surfsig.resolution import step_text
+from surfsig.status import Status
 
 
 def extract(

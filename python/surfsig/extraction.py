@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -16,58 +15,21 @@ from surfsig.arguments import progress_callback
 from surfsig.defaults import SIGNATURE_BLOCK, Axes
 from surfsig.errors import InvalidInputError
 from surfsig.extraction_report import report_html
-from surfsig.flat_atom import flat_atom_length
+from surfsig.flat_atom import length_asked_for
 from surfsig.page import NOTEBOOK_POINTS, notebook_html, write_page
 from surfsig.places import place_numbers
 from surfsig.point_cloud import PointCloud
 from surfsig.progress import ProgressCallback
 from surfsig.signature_similarity import SIGNATURE, similarity
+from surfsig.status import FitUsed, Status, count_statuses
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
+__all__ = ["Extraction", "FitUsed", "Status"]
+
 FloatArray = NDArray[np.float32]
-
-
-class Status(enum.IntEnum):
-    """Why a point has the values that it has."""
-
-    OK = 0
-    """All values are there."""
-    NOT_FINITE = 1
-    """A coordinate is not finite: no values."""
-    TOO_FEW_POINTS = 2
-    """Fewer than six points in the ball: no curvature; a normal where three span a plane."""
-    DEGENERATE = 3
-    """The points lie on a line or a conic and determine no paraboloid: no curvature."""
-    NOT_CONVERGED = 4
-    """The surface's own axes did not converge: the values are of the last iteration (edges, corners)."""
-    OUTSIDE_VOCABULARY = 5
-    """More curved than any atom of the frame: curvature, but no signature."""
-    ONE_SIDED = 6
-    """The points lie mostly on one side of the place (a rim): all values are there, with larger standard
-    errors, and biased where the surface is no paraboloid."""
-    TOO_COARSE = 7
-    """Coordinates come in steps too large for the radius (float32 at UTM coordinates): no curvature, and a
-    normal of the points as they are."""
-
-
-def count_statuses(statuses: NDArray[np.uint8]) -> dict[str, int]:
-    """Count the places of each status, by its name in lower case; none that has no place."""
-    counts = np.bincount(statuses, minlength=len(Status))
-    return {status.name.lower(): int(counts[status]) for status in Status if counts[status]}
-
-
-class FitUsed(enum.IntEnum):
-    """Whose curvature a place has."""
-
-    NONE = 0
-    """There is none."""
-    PARABOLOID = 1
-    """The paraboloid's."""
-    QUADRIC = 2
-    """The implicit quadric's."""
 
 
 _NO_COLUMNS = {"radius", "axes", "oriented", "points", "indices", "coefficients"}
@@ -325,7 +287,7 @@ class Extraction:
         """
         places = place_numbers(at, len(self))
         frame = Frame.default() if frame is None else frame
-        length = self._flat_atom(flat_atom, frame)
+        length = length_asked_for(flat_atom, self, frame)
         rows, status = self._signatures(places, frame)
         if length is not None:
             flat = np.full((len(rows), 1), length, np.float32)
@@ -336,15 +298,6 @@ class Extraction:
         # The fit's own status says more, but for places that it left in order.
         fitted = self.status[places]
         return rows, np.where(status == Status.OK, fitted, status).astype(np.uint8)
-
-    def _flat_atom(self, flat_atom: float | Literal["auto"] | None, frame: Frame) -> float | None:
-        if flat_atom is None:
-            return None
-        if flat_atom == "auto":
-            return flat_atom_length(self, frame=frame)
-        if isinstance(flat_atom, str) or not (np.isfinite(flat_atom) and flat_atom > 0):
-            raise InvalidInputError(f'flat_atom must be a finite number above 0 or "auto", not {flat_atom!r}')
-        return flat_atom
 
     def _signatures(self, places: NDArray[np.int64], frame: Frame) -> tuple[FloatArray, NDArray[np.uint8]]:
         side, curvatures, surfaces = 1.0, (self.k1[places], self.k2[places]), self.coefficients
@@ -391,7 +344,7 @@ class Extraction:
         if block < 1:
             raise InvalidInputError(f"block must be 1 or more, not {block}")
         frame = Frame.default() if frame is None else frame
-        length = self._flat_atom(flat_atom, frame)
+        length = length_asked_for(flat_atom, self, frame)
         for start in range(0, len(self), block):
             places = slice(start, min(start + block, len(self)))
             rows, status = self.signatures(

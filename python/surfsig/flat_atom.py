@@ -7,7 +7,7 @@ as good as nothing beside a signature that noise cannot explain, and outweighs o
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -83,6 +83,25 @@ def flat_atom_length(*extractions: Extraction, flat: bool = False, frame: Frame 
     if length is None:
         raise InvalidInputError("the noise is beyond the vocabulary: take a larger radius")
     return length
+
+
+def length_asked_for(
+    flat_atom: float | Literal["auto"] | None, extraction: Extraction, frame: Frame
+) -> float | None:
+    """Return the length that an argument `flat_atom` asks for; None where it asks for no flat atom.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is neither "auto" nor a finite number above 0, or as `flat_atom_length`.
+    """
+    if flat_atom is None:
+        return None
+    if flat_atom == "auto":
+        return flat_atom_length(extraction, frame=frame)
+    if isinstance(flat_atom, str) or not (np.isfinite(flat_atom) and flat_atom > 0):
+        raise InvalidInputError(f'flat_atom must be a finite number above 0 or "auto", not {flat_atom!r}')
+    return flat_atom
 
 
 def _noise_in_patch_units(extraction: Extraction, flat: bool) -> float:

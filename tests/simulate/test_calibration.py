@@ -59,6 +59,30 @@ def test_mixed_returns_lie_between_those_of_both_surfaces() -> None:
     assert ((mixed >= low - 1e-4) & (mixed <= high + 1e-4))[changed].all()
 
 
+def test_the_last_return_of_a_line_is_mixed_with_the_first_of_a_whole_turn_only() -> None:
+    pose = simulate.upright_pose(1.2, 0.8, 1.3, 0.4)
+
+    def changed(sensor: simulate.Lidar | simulate.DepthCamera) -> np.ndarray:
+        """Of each ray of a line, whether any of its returns changes."""
+        clean, mixed = (
+            np.linalg.norm(
+                simulate.scan(ROOM, sensor, pose, calibration=simulate.Calibration(mixed=share)).points,
+                axis=1,
+            )
+            for share in (0.0, 1.0)
+        )
+        width = sensor.steps if isinstance(sensor, simulate.Lidar) else sensor.width
+        return np.asarray((np.abs(clean - mixed) > 1e-3).reshape(-1, width).any(axis=0))
+
+    for sensor in (
+        simulate.Lidar(lines=4, steps=10, noise=0.0, view=170.0),
+        simulate.DepthCamera(10, 4, view=150.0, noise=0.0, max_range=20.0),
+    ):
+        assert changed(sensor)[:-1].any()
+        assert not changed(sensor)[-1]
+    assert changed(simulate.Lidar(lines=4, steps=4, noise=0.0))[-1]
+
+
 def test_a_storey_has_rooms_that_see_each_other() -> None:
     scene = simulate.storey(4, rooms=(2, 1))
     lidar = simulate.Lidar(lines=8, steps=180, elevation=(-5.0, 5.0))

@@ -69,6 +69,12 @@ def test_a_lidar_has_its_lines_and_a_camera_its_view() -> None:
     rays = simulate.Lidar(lines=3, elevation=(-10.0, 20.0), steps=4).rays()
     elevation = np.degrees(np.arcsin(rays[:, 2]))
     assert np.allclose(np.unique(elevation.round(6)), [-10.0, 5.0, 20.0])
+    azimuth = np.degrees(np.arctan2(rays[:, 1], rays[:, 0])).reshape(3, 4)
+    assert np.allclose(np.abs(azimuth), [180.0, 90.0, 0.0, 90.0])
+    assert np.allclose(azimuth[:, [1, 3]], [-90.0, 90.0])
+    rays = simulate.Lidar(lines=2, steps=4, view=90.0).rays()
+    azimuth = np.degrees(np.arctan2(rays[:, 1], rays[:, 0])).reshape(2, 4)
+    assert np.allclose(azimuth, [-45.0, -22.5, 0.0, 22.5])
     rays = simulate.DepthCamera(100, 50, view=90.0).rays()
     # From the middle of the first to the middle of the last pixel.
     assert np.allclose(rays[0] / rays[0, 2], [-0.99, -0.49, 1.0])

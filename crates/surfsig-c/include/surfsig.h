@@ -1135,6 +1135,22 @@ double surfsig_odometry_voxel(const surfsig_odometry *odometry);
 surfsig_code surfsig_odometry_pose(const surfsig_odometry *odometry, size_t index, surfsig_scan_pose *pose);
 
 /**
+ * Takes the points of a scan to where they would have been measured at the time of its pose: exp(t m) p, with the
+ * sensor's twist m in a unit of time, and each point's time t in that unit.
+ *
+ * @param cloud The scan's points.
+ * @param times Of each point, from the time of the pose on. A point whose time is not finite stays.
+ * @param twist A rotation vector in radians, and a translation: 6 doubles, finite, as those of surfsig_odometry_twist(),
+ * which are for an interval between scans.
+ * @param points Room for (n, 3) doubles, packed: offsets from the cloud's origin. Not a number for points that are not
+ * finite.
+ */
+surfsig_code surfsig_deskew(const surfsig_cloud *cloud,
+                            const double *times,
+                            const double *twist,
+                            double *points);
+
+/**
  * Makes options of the default values: paraboloids in the surface's axes, no viewpoint, all cores, every point.
  */
 surfsig_options *surfsig_options_new(void);

@@ -131,6 +131,12 @@ public:
     check(surfsig_odometry_push_timed(handle_.get(), &given, times.data(), &pose));
     return pose;
   }
+  /** By which the sensor moves from a scan to the next one, in its axes; NaN where no times of points were given. */
+  Twist twist(std::size_t index) const {
+    Twist twist;
+    check(surfsig_odometry_twist(handle_.get(), index, twist.data()));
+    return twist;
+  }
   /** Number of the map that a scan's pose is in; -1 where it has none. */
   std::int64_t segment(std::size_t index) const { return surfsig_odometry_segment(handle_.get(), index); }
   /** Number of scans so far. */
@@ -146,6 +152,18 @@ public:
 private:
   detail::Handle<surfsig_odometry, surfsig_odometry_free> handle_;
 };
+
+/**
+ * Takes the points of a scan to where they would have been measured at the time of its pose, by the sensor's twist in a
+ * unit of time, and the time of each point from that of the pose on, in that unit. Offsets from the cloud's origin.
+ */
+inline std::vector<Vector> deskew(const Cloud &cloud, const std::vector<double> &times, const Twist &twist) {
+  if (times.size() != cloud.size()) throw std::invalid_argument("there must be one time for each point");
+  std::vector<Vector> points(times.size());
+  if (points.empty()) return points;
+  check(surfsig_deskew(cloud.get(), times.data(), twist.data(), points.front().data()));
+  return points;
+}
 
 } // namespace surfsig
 

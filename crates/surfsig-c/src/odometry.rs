@@ -1,12 +1,13 @@
 //! The poses of a sensor that moves, scan by scan.
 
-use crate::arrays::{array, present, put, put_new, room};
+use crate::arrays::{array, numbers, present, put, put_new, room};
+use crate::cloud::{given, surfsig_cloud};
 use crate::code::{Failure, guarded, surfsig_code};
 use crate::options::thread_count;
 use crate::registration::{SURFSIG_FREE_DIRECTIONS, surfsig_free_direction, surfsig_scan};
-use crate::transform::surfsig_transform;
+use crate::transform::{finite, surfsig_transform};
 use std::ffi::{CStr, c_char};
-use surfsig::{Odometry, OdometrySettings, ScanPose, ScanStatus};
+use surfsig::{Odometry, OdometrySettings, ScanPose, ScanStatus, deskew, with_threads};
 
 /// Why a scan has the pose that it has.
 #[repr(u8)]
@@ -242,5 +243,34 @@ pub unsafe extern "C" fn surfsig_odometry_pose(
         let found = poses.get(index).ok_or_else(|| outside(index, poses.len()))?;
         // SAFETY: the caller gives room for a result, or null.
         unsafe { put(pose, surfsig_scan_pose::of(found), "pose") }
+    })
+}
+
+/// Takes the points of a scan to where they would have been measured at the time of its pose: exp(t m) p, with the
+/// sensor's twist m in a unit of time, and each point's time t in that unit.
+///
+/// @param cloud The scan's points.
+/// @param times Of each point, from the time of the pose on. A point whose time is not finite stays.
+/// @param twist A rotation vector in radians, and a translation: 6 doubles, finite, as those of surfsig_odometry_twist(),
+/// which are for an interval between scans.
+/// @param points Room for (n, 3) doubles, packed: offsets from the cloud's origin. Not a number for points that are not
+/// finite.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn surfsig_deskew(
+    cloud: Option<&surfsig_cloud>,
+    times: *const f64,
+    twist: *const f64,
+    points: *mut f64,
+) -> surfsig_code {
+    guarded(|| {
+        let cloud = given(cloud)?.view();
+        // SAFETY: the caller gives as many times as there are points, or null.
+        let times = unsafe { array(times, cloud.len(), "times")? };
+        // SAFETY: the caller gives six numbers, or null.
+        let twist = finite(present(unsafe { numbers(twist) }, "twist")?, "twist")?;
+        // SAFETY: the caller gives room for as many points, or null.
+        let room = unsafe { room(points.cast::<[f64; 3]>(), cloud.len(), "points")? };
+        room.copy_from_slice(&with_threads(None, || deskew(&cloud, times, twist))??);
+        Ok(())
     })
 }

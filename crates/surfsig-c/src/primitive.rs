@@ -5,7 +5,7 @@ use crate::cloud::{given, surfsig_cloud};
 use crate::code::{Failure, guarded, surfsig_code};
 use crate::kind::{kind_of, surfsig_surface_kind};
 use crate::primitive_options::{surfsig_primitive_options, surfsig_primitive_options_set_start};
-use surfsig::{Primitive, SurfaceKind, fit_primitive_with};
+use surfsig::{Primitive, SurfaceKind, fit_primitive_with, with_threads};
 
 /// A plane, sphere, cylinder, cone or torus without a boundary, a circle or a line. Made by surfsig_fit_primitive(),
 /// freed by surfsig_primitive_free(). It refers to nothing of the caller's.
@@ -64,8 +64,8 @@ pub unsafe extern "C" fn surfsig_fit_primitive_with(
         let (cloud, kind) = (given(cloud)?, kind_of(kind)?);
         let (positions, nothing) = (cloud.positions(), surfsig_primitive_options::default());
         let options = options.unwrap_or(&nothing).of(kind, positions.len())?;
-        let fitted = fit_primitive_with(&positions, kind, &options)
-            .ok_or_else(|| Failure::undetermined(kind.name()))?;
+        let found = with_threads(None, || fit_primitive_with(&positions, kind, &options))?;
+        let fitted = found.ok_or_else(|| Failure::undetermined(kind.name()))?;
         Ok(surfsig_primitive { fitted, point: fitted.point(), axis: fitted.axis() })
     };
     // SAFETY: the caller gives room for a pointer, or null.

@@ -241,7 +241,7 @@ unsafe fn given(transform: *const surfsig_transform, name: &str) -> Result<Rigid
 }
 
 /// Numbers of which none is infinite or not a number.
-fn finite<const N: usize>(numbers: [f64; N], name: &str) -> Result<[f64; N], Failure> {
+pub(crate) fn finite<const N: usize>(numbers: [f64; N], name: &str) -> Result<[f64; N], Failure> {
     if numbers.iter().all(|number| number.is_finite()) {
         return Ok(numbers);
     }

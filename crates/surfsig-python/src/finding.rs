@@ -1,5 +1,6 @@
 //! Instances of models, for Python.
 
+use crate::all_cores::on_all_cores;
 use crate::field::{PHASES, PlacesArgument, table};
 use crate::registration::{ScanArgument, free_directions_to_python};
 use crate::rows;
@@ -208,5 +209,5 @@ fn to_python(py: Python<'_>, instance: Instance) -> PyResult<Bound<'_, PyDict>> 
 #[pyfunction]
 pub fn point_spacing(py: Python<'_>, points: PyReadonlyArray2<'_, f64>) -> PyResult<f64> {
     let points = rows::<f64, 3>(&points)?;
-    Ok(py.detach(|| surfsig::point_spacing(points)))
+    on_all_cores(py, || surfsig::point_spacing(points))
 }

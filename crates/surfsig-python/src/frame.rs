@@ -1,5 +1,6 @@
 //! The frame, for Python.
 
+use crate::all_cores::on_all_cores;
 use crate::to_python;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -43,8 +44,7 @@ impl Frame {
     }
 
     fn own(py: Python<'_>, parameters: FrameParameters) -> PyResult<Self> {
-        let make = || surfsig::with_threads(None, || surfsig::Frame::new(parameters));
-        let frame = py.detach(make).map_err(to_python)?.map_err(to_python)?;
+        let frame = on_all_cores(py, || surfsig::Frame::new(parameters))?.map_err(to_python)?;
         Ok(Self { frame: Held::Own(Box::new(frame)) })
     }
 }
@@ -63,7 +63,7 @@ fn rows<'py>(
     {
         let mut filled = array.readwrite();
         let (rows, _) = filled.as_slice_mut()?.as_chunks_mut::<SIGNATURE>();
-        py.detach(|| surfsig::with_threads(None, || fill(rows, &mut statuses))).map_err(to_python)?;
+        on_all_cores(py, || fill(rows, &mut statuses))?;
     }
     let numbers: Vec<u8> = statuses.into_iter().map(|status| status as u8).collect();
     Ok((array, numbers.into_pyarray(py)))
@@ -115,8 +115,7 @@ impl Frame {
     /// Frame
     #[staticmethod]
     fn default(py: Python<'_>) -> PyResult<Self> {
-        let frame = py.detach(|| surfsig::with_threads(None, surfsig::Frame::shared)).map_err(to_python)?;
-        Ok(Self { frame: Held::Shared(frame) })
+        Ok(Self { frame: Held::Shared(on_all_cores(py, surfsig::Frame::shared)?) })
     }
 
     /// The frame of the paper's reproduction: table II, eq. (4) as printed, 3,109 atoms, smallest

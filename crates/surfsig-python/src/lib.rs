@@ -1,5 +1,6 @@
 //! The bindings: release the interpreter, call the core, map the error; nothing else.
 
+mod all_cores;
 mod e57;
 mod extract;
 mod field;

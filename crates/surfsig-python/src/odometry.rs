@@ -1,5 +1,6 @@
 //! Odometry, for Python.
 
+use crate::all_cores::on_all_cores;
 use crate::extract::Points;
 use crate::registration::free_directions_to_python;
 use crate::settings::settings_class;
@@ -64,7 +65,7 @@ pub fn deskewed_points<'py>(
     origin: [f64; 3],
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (cloud, times) = (points.cloud(origin)?, times.as_slice()?);
-    let found = py.detach(|| surfsig::deskew(&cloud, times, twist)).map_err(to_python)?;
+    let found = on_all_cores(py, || surfsig::deskew(&cloud, times, twist))?.map_err(to_python)?;
     let count = found.len();
     found.into_flattened().into_pyarray(py).reshape([count, 3])
 }
@@ -80,7 +81,7 @@ pub fn spin_times<'py>(
     spin_rate: f64,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let cloud = points.cloud(origin)?;
-    Ok(py.detach(|| surfsig::spin_times(&cloud, sensor, spin_rate)).into_pyarray(py))
+    Ok(on_all_cores(py, || surfsig::spin_times(&cloud, sensor, spin_rate))?.into_pyarray(py))
 }
 
 /// The first and the last of the finite times (n,), or None if fewer than `fewest` are different.

@@ -1,5 +1,6 @@
 //! One surface fitted to points by orthogonal distance, for Python.
 
+use crate::all_cores::on_all_cores;
 use crate::rows;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
@@ -96,5 +97,5 @@ pub fn fit_primitive(
     let (points, kind) = (rows::<f64, 3>(&points)?, kind_of(kind)?);
     let weights = weights.as_ref().map(|weights| weights.as_slice()).transpose()?;
     let options = PrimitiveFitOptions { start: start.map(|start| &start.0), weights, radius, axis };
-    Ok(py.detach(|| surfsig::fit_primitive_with(points, kind, &options)).map(Primitive))
+    Ok(on_all_cores(py, || surfsig::fit_primitive_with(points, kind, &options))?.map(Primitive))
 }

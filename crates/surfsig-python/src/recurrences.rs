@@ -1,5 +1,6 @@
 //! Poses between pieces of scans, for Python.
 
+use crate::all_cores::on_all_cores;
 use crate::registration::{alternatives_to_python, free_directions_to_python};
 use crate::settings::settings_class;
 use crate::watched::watched;
@@ -154,7 +155,7 @@ impl PieceView {
         let situation = PieceSituation { viewpoint, second_viewpoint, support_planes };
         let settings = RecurrenceSettings::with_threads(settings, None);
         let make = || surfsig::PieceView::new(&scan, &piece, &situation, pair_unit, &settings);
-        Ok(Self { view: py.detach(make).map_err(to_python)? })
+        Ok(Self { view: on_all_cores(py, make)?.map_err(to_python)? })
     }
 
     /// The mean of the piece's points, in the scan: the origin of poses.

@@ -1,5 +1,6 @@
 //! The surfaces of a scan, for Python.
 
+use crate::all_cores::on_all_cores;
 use crate::extract::Points;
 use crate::primitive::kind_of;
 use crate::rows;
@@ -111,7 +112,7 @@ pub fn join_surface_pieces<'py>(
     let pieces = pieces.iter().map(piece).collect::<PyResult<Vec<_>>>()?;
     let pair = |(first, second, overlap)| PiecePair { first, second, overlap };
     let pairs: Vec<PiecePair> = pairs.into_iter().map(pair).collect();
-    let joined = py.detach(|| surfsig::join_surface_pieces(&pieces, &pairs));
+    let joined = on_all_cores(py, || surfsig::join_surface_pieces(&pieces, &pairs))?;
     let surface = |primitive: &surfsig::Primitive| {
         let values = PyDict::new(py);
         values.set_item("kind", primitive.kind().name())?;

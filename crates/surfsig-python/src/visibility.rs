@@ -1,5 +1,6 @@
 //! What can have been seen from where, for Python.
 
+use crate::all_cores::on_all_cores;
 use crate::rows;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -28,12 +29,12 @@ pub fn measured_from_origin(
     spacing: f64,
 ) -> PyResult<bool> {
     let points = rows::<f64, 3>(&points)?;
-    Ok(py.detach(|| surfsig::measured_from_origin(points, spacing)))
+    on_all_cores(py, || surfsig::measured_from_origin(points, spacing))
 }
 
 /// From where a sensor measured points (n, 3), or None; see `surfsig.visibility`.
 #[pyfunction]
 pub fn estimated_viewpoint(py: Python<'_>, points: PyReadonlyArray2<'_, f64>) -> PyResult<Option<[f64; 3]>> {
     let points = rows::<f64, 3>(&points)?;
-    Ok(py.detach(|| surfsig::estimated_viewpoint(points)))
+    on_all_cores(py, || surfsig::estimated_viewpoint(points))
 }

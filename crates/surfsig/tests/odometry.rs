@@ -181,3 +181,31 @@ fn poses_that_no_scan_alone_is_certain_of_wait_for_the_next_scans() {
     assert_eq!(given[11], [(9, ScanStatus::Relocalised), (10, tracked), (11, tracked)]);
     assert!(errors(odometry.poses(), &steps).iter().all(|error| *error < 0.01));
 }
+
+#[test]
+fn of_the_maps_before_the_present_one_as_many_are_kept_as_are_asked_for() {
+    // Three rooms of other sizes, one after the other, and the first one again.
+    let visits = [([1.0; 3], 0..4), ([1.5, 1.3, 1.2], 0..7), ([1.2, 1.7, 1.0], 0..7), ([1.0; 3], 1..8)];
+    let sized =
+        |cuboid: &Cuboid, factors: &[f64; 3]| cuboid.map(|corner| [0, 1, 2].map(|k| corner[k] * factors[k]));
+    let scans: Vec<Vec<[f64; 3]>> = visits
+        .iter()
+        .flat_map(|(factors, steps)| {
+            let boxes: Vec<Cuboid> = furniture().iter().map(|one| sized(one, factors)).collect();
+            let room = sized(&ROOM, factors);
+            steps.clone().map(move |step| scan(&room, &boxes, &pose(step), step as u64))
+        })
+        .collect();
+    let segments = |max_kept| {
+        let mut settings = OdometrySettings::default();
+        settings.segments.max_kept = max_kept;
+        let found = follow(&scans, settings);
+        let known = found.iter().filter(|pose| pose.T_map_scan.is_some());
+        known.map(|pose| (pose.scan, pose.segment)).collect::<Vec<_>>()
+    };
+    let before: Vec<(usize, usize)> = (0..18).zip([[0; 4].as_slice(), &[1; 7], &[2; 7]].concat()).collect();
+    // The first room's map is searched after the present one and the second room's.
+    let again = |segment, from| (from..25).map(move |scan| (scan, segment));
+    assert_eq!(segments(2), before.iter().copied().chain(again(0, 20)).collect::<Vec<_>>());
+    assert_eq!(segments(1), before.iter().copied().chain(again(3, 18)).collect::<Vec<_>>());
+}

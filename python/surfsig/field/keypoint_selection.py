@@ -11,11 +11,11 @@ from surfsig import _surfsig
 from surfsig.arguments import positive_length, progress_callback, thread_count, whole_number
 from surfsig.defaults import KEYPOINTS
 from surfsig.errors import InvalidInputError
-from surfsig.extraction import Status
 from surfsig.field.signatures import FieldSignatures
 from surfsig.orientation import orientation
 from surfsig.point_cloud import PointCloud
 from surfsig.progress import ProgressCallback
+from surfsig.status import Status
 
 _MOST = 2**32 - 1
 

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
 from surfsig.arguments import positive_length, progress_callback, thread_count
-from surfsig.extraction import Status
 from surfsig.orientation import orientation
 from surfsig.places import place_numbers, places
 from surfsig.point_cloud import PointCloud
+from surfsig.status import Status
 
 FloatArray = NDArray[np.float32]
 

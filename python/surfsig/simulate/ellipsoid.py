@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .poses import Array
-from .surfaces import Surface, round_crossings
+from .ray_crossings import round_crossings
+from .surfaces import Surface
 
 
 @dataclass(frozen=True)

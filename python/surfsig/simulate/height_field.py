@@ -8,7 +8,8 @@ import numpy as np
 
 from ..errors import InvalidInputError
 from .poses import Array
-from .surfaces import Surface, slab_entry_exit
+from .ray_crossings import slab_entry_exit
+from .surfaces import Surface
 
 _MAX_STEPS = 200
 _ON_SURFACE = 1e-13  # metres

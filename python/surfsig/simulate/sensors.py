@@ -19,7 +19,7 @@ _EDGE = 0.05
 
 @dataclass(frozen=True)
 class Lidar:
-    """A spinning lidar, whose axis is its z axis. Angles are in degrees, lengths in metres.
+    """A lidar that turns about its z axis. Angles are in degrees, lengths in metres.
 
     Parameters
     ----------
@@ -28,13 +28,15 @@ class Lidar:
     elevation
         Of the lowest and the highest laser.
     steps
-        Directions in a turn.
+        Directions from the first to the last.
     noise
         Standard deviation of a measured range.
     max_range
         Beyond, nothing is measured.
     dropout
         Share of the returns that are lost, by chance.
+    view
+        Angle of all its directions, half of it to either side of its x axis; a whole turn by default.
     """
 
     lines: int = 32
@@ -43,6 +45,7 @@ class Lidar:
     noise: float = 0.01
     max_range: float = 100.0
     dropout: float = 0.0
+    view: float = 360.0
 
     def rays(self, line_errors: ArrayLike = 0.0) -> Array:
         """Give unit vectors in the sensor's axes, (lines * steps, 3), one line after the other.
@@ -53,9 +56,10 @@ class Lidar:
             Radians by which each laser looks higher than the even spread says, (lines,).
         """
         low, high = np.radians(self.elevation)
+        view = np.radians(self.view)
         elevation, azimuth = np.meshgrid(
             np.linspace(low, high, self.lines) + np.asarray(line_errors, np.float64),
-            np.arange(self.steps) / self.steps * 2.0 * np.pi - np.pi,
+            np.arange(self.steps) / self.steps * view - view / 2.0,
             indexing="ij",
         )
         flat = np.cos(elevation)
@@ -200,7 +204,8 @@ def scan(
     ranges = hits.t
     if calibration is not None:
         width = sensor.steps if isinstance(sensor, Lidar) else sensor.width
-        ranges = _mixed(ranges, hits.surface, width, wrong.mixed, rng)
+        is_turn = isinstance(sensor, Lidar) and sensor.view == 360.0
+        ranges = _mixed(ranges, hits.surface, width, is_turn, wrong.mixed, rng)
         cosine = np.abs(np.einsum("ni,ni->n", directions, hits.normals))
         ranges = ranges * (1.0 + wrong.range_scale) + wrong.incidence * (1.0 - cosine)
     deviation = sensor.noise * (1.0 if is_lidar else hits.t[met] ** 2)
@@ -220,7 +225,7 @@ def scan_moving(
     sensor
         The lidar; all its lasers fire at once.
     poses
-        (steps, 4, 4), T_scene_sensor at each of its directions, from behind counter-clockwise to behind.
+        (steps, 4, 4), T_scene_sensor at each direction, counter-clockwise: a whole turn begins behind.
     seed
         Of noise and dropouts; the same seed gives the same scan.
     period
@@ -267,9 +272,17 @@ def _drawn(
 
 
 def _mixed(
-    ranges: Array, surface: NDArray[np.int32], width: int, share: float, rng: np.random.Generator
+    ranges: Array,
+    surface: NDArray[np.int32],
+    width: int,
+    is_turn: bool,
+    share: float,
+    rng: np.random.Generator,
 ) -> Array:
-    """Mix a share of the returns with those of the next ray of the line, where another surface lies apart."""
+    """Mix a share of the returns with those of the next ray of the line, where another surface lies apart.
+
+    After the last ray of a line the first one comes if the line is a whole turn, and none otherwise.
+    """
     rows, surfaces = ranges.reshape(-1, width), surface.reshape(-1, width)
     following = np.roll(rows, -1, axis=1)
     drawn, part = rng.random(rows.shape), rng.random(rows.shape)
@@ -277,6 +290,7 @@ def _mixed(
         is_other = surfaces != np.roll(surfaces, -1, axis=1)
         apart = is_other & (np.abs(following - rows) > _EDGE * np.minimum(rows, following))
         is_mixed = apart & np.isfinite(rows) & np.isfinite(following) & (drawn < share)
+        is_mixed[:, -1] &= is_turn
         mixed = np.where(is_mixed, rows + part * (following - rows), rows)
     return np.asarray(mixed.reshape(-1))
 

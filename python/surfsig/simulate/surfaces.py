@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from ..errors import InvalidInputError
 from .poses import Array
+from .ray_crossings import coordinate_at, disc_crossing, level_crossing, round_crossings, slab_entry_exit
 
 
 class Surface(ABC):
@@ -75,39 +76,6 @@ class Surface(ABC):
                     )
 
 
-def slab_entry_exit(origins: Array, directions: Array, half: Array) -> tuple[Array, Array]:
-    """Parameters (n,), (n,) where rays enter and leave a box |p| <= half; infinite if they miss it."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        one = (-half - origins) / directions
-        other = (half - origins) / directions
-    # 0 / 0: the ray runs inside a face, which limits nothing.
-    lower = np.where(np.isnan(one) | np.isnan(other), -np.inf, np.minimum(one, other))
-    upper = np.where(np.isnan(one) | np.isnan(other), np.inf, np.maximum(one, other))
-    enter, leave = lower.max(axis=1), upper.min(axis=1)
-    missed = enter > leave
-    return np.where(missed, np.inf, enter), np.where(missed, np.inf, leave)
-
-
-def _at(origins: Array, directions: Array, t: Array, axis: int) -> Array:
-    """One coordinate of the points at t; NaN where t is infinite, so that comparisons fail."""
-    with np.errstate(invalid="ignore"):
-        return np.asarray(origins[:, axis] + np.where(np.isfinite(t), t, np.nan) * directions[:, axis])
-
-
-def _level_crossing(origins: Array, directions: Array, level: float) -> Array:
-    """Parameter (n,) at which rays reach z = level; infinite for rays that run along it."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = (level - origins[:, 2]) / directions[:, 2]
-    return np.where(np.isfinite(t), t, np.inf)
-
-
-def _disc_crossing(origins: Array, directions: Array, level: float, radius: float) -> Array:
-    """Like a level crossing, but only within a distance of the z axis."""
-    t = _level_crossing(origins, directions, level)
-    distance = np.hypot(_at(origins, directions, t, 0), _at(origins, directions, t, 1))
-    return np.where(distance <= radius, t, np.inf)
-
-
 def _radial(points: Array) -> tuple[Array, Array]:
     """Return unit vectors (n, 3) away from the z axis, and distances (n,) from it."""
     distance = np.hypot(points[:, 0], points[:, 1])
@@ -122,7 +90,7 @@ class Plane(Surface):
 
     def crossings(self, origins: Array, directions: Array) -> Array:
         """See :meth:`Surface.crossings`; k = 1."""
-        return _level_crossing(origins, directions, 0.0)[None]
+        return level_crossing(origins, directions, 0.0)[None]
 
     def implicit(self, points: Array) -> Array:
         """Signed distance, positive above."""
@@ -160,8 +128,8 @@ class Rectangle(Plane):
     def crossings(self, origins: Array, directions: Array) -> Array:
         """See :meth:`Surface.crossings`; k = 1."""
         t = super().crossings(origins, directions)[0]
-        inside = np.abs(_at(origins, directions, t, 0)) <= self.size[0] / 2
-        inside &= np.abs(_at(origins, directions, t, 1)) <= self.size[1] / 2
+        inside = np.abs(coordinate_at(origins, directions, t, 0)) <= self.size[0] / 2
+        inside &= np.abs(coordinate_at(origins, directions, t, 1)) <= self.size[1] / 2
         return np.where(inside, t, np.inf)[None]
 
 
@@ -202,21 +170,6 @@ class Sphere(Surface):
         return np.full((len(points), 2), 1.0 / self.radius)
 
 
-def round_crossings(origins: Array, directions: Array, radius: float) -> Array:
-    """Crossings (2, n) with |p| = radius, in as many dimensions as the arrays have columns.
-
-    Taken from the point of closest approach: the textbook discriminant loses half its digits on a ray that
-    starts many radii away.
-    """
-    square = np.einsum("ij,ij->i", directions, directions)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        closest = -np.einsum("ij,ij->i", origins, directions) / square
-        foot = origins + closest[:, None] * directions
-        half = np.sqrt((radius**2 - np.einsum("ij,ij->i", foot, foot)) / square)
-    t = np.stack([closest - half, closest + half])
-    return np.where(np.isfinite(t), t, np.inf)
-
-
 @dataclass(frozen=True)
 class Cylinder(Surface):
     """A cylinder about the z axis, its middle at the origin.
@@ -245,9 +198,9 @@ class Cylinder(Surface):
         """See :meth:`Surface.crossings`; k = 4, or 2 when open."""
         half = self.length / 2
         side = round_crossings(origins[:, :2], directions[:, :2], self.radius)
-        rows = [np.where(np.abs(_at(origins, directions, t, 2)) <= half, t, np.inf) for t in side]
+        rows = [np.where(np.abs(coordinate_at(origins, directions, t, 2)) <= half, t, np.inf) for t in side]
         if self.capped:
-            rows += [_disc_crossing(origins, directions, level, self.radius) for level in (-half, half)]
+            rows += [disc_crossing(origins, directions, level, self.radius) for level in (-half, half)]
         return np.stack(rows)
 
     def implicit(self, points: Array) -> Array:
@@ -331,13 +284,13 @@ class Cone(Surface):
             roots = np.stack([q / a, c / q])
         rows = []
         for t in roots:
-            z = _at(origins, directions, t, 2)
+            z = coordinate_at(origins, directions, t, 2)
             # The quadratic also describes the mirror image of the cone beyond its apex.
             real = (z >= 0.0) & (z <= self.height) & (self.radius + slope * z >= 0.0)
             rows.append(np.where(real, t, np.inf))
         if self.capped:
-            rows.append(_disc_crossing(origins, directions, 0.0, self.radius))
-            rows.append(_disc_crossing(origins, directions, self.height, self.top_radius))
+            rows.append(disc_crossing(origins, directions, 0.0, self.radius))
+            rows.append(disc_crossing(origins, directions, self.height, self.top_radius))
         return np.stack(rows)
 
     def implicit(self, points: Array) -> Array:

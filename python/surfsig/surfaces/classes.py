@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfsig.curvature import extract
-from surfsig.extraction import Extraction, Status
+from surfsig.extraction import Extraction
 from surfsig.point_cloud import PointCloud
 from surfsig.shapes.surface import Surface
+from surfsig.status import Status
 
 NEIGHBORS = 24
 """Nearest points by which a point is judged that belongs to no surface."""

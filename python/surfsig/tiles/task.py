@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from surfsig.curvature import WholeCloud, extract_part
 from surfsig.defaults import Axes, Fit
 from surfsig.errors import FileFormatError
-from surfsig.extraction import count_statuses
 from surfsig.files import write
 from surfsig.point_cloud import PointCloud
+from surfsig.status import count_statuses
 from surfsig.tiles.manifest import Record, write_record
 from surfsig.tiles.plan import Plan
 from surfsig.tiles.rows import FileHead

@@ -126,6 +126,7 @@ fn no_function_of_the_header_fails_but_by_a_code() {
     poses::registration_options(&mut called);
     poses::registrations(&mut called);
     poses::odometries(&mut called);
+    poses::deskewing(&mut called);
     finding::options(&mut called);
     finding::models(&mut called);
     finding::instances(&mut called);

@@ -113,3 +113,28 @@ pub fn odometries(called: &mut Called) {
     }
     call!(called, surfsig_odometry_free(owned(made)));
 }
+
+pub fn deskewing(called: &mut Called) {
+    let twist = [0.0, 0.0, 0.5, 1.0, 0.0, 0.0];
+    let mut moved = [[0.0; 3]; 2];
+    let out = moved.as_mut_ptr().cast();
+    let cloud = Cloud::of(&[[1.0, 2.0, 3.0]; 2]);
+    let times = [0.0, f64::NAN];
+    call!(called, surfsig_deskew(None, times.as_ptr(), twist.as_ptr(), out) gives INVALID);
+    call!(called, surfsig_deskew(cloud.get(), null(), twist.as_ptr(), out) gives INVALID);
+    call!(called, surfsig_deskew(cloud.get(), times.as_ptr(), null(), out) gives INVALID);
+    call!(called, surfsig_deskew(cloud.get(), times.as_ptr(), BAD.as_ptr(), out) gives INVALID);
+    call!(called, surfsig_deskew(cloud.get(), times.as_ptr(), twist.as_ptr(), null_mut()) gives INVALID);
+    call!(called, surfsig_deskew(cloud.get(), times.as_ptr(), twist.as_ptr(), out) gives OK);
+    assert_eq!(moved, [[1.0, 2.0, 3.0]; 2], "at the time of the pose, and without a time");
+    for points in odd_clouds() {
+        let (cloud, times) = (Cloud::of(&points), vec![0.5; points.len()]);
+        let mut moved = vec![[0.0; 3]; points.len()];
+        let out = moved.as_mut_ptr().cast();
+        call!(called, surfsig_deskew(cloud.get(), times.as_ptr(), twist.as_ptr(), out) gives OK);
+        let is_finite = |point: &[f64; 3]| point.iter().all(|c| c.is_finite());
+        // Where coordinates are near the largest number there is, a motion may leave it.
+        let lost = points.iter().zip(&moved).filter(|(before, after)| !is_finite(before) && is_finite(after));
+        assert_eq!(lost.count(), 0);
+    }
+}

@@ -1,7 +1,8 @@
 //! How much of a source a target's surface explains, and whether two transforms explain the same.
 
 use super::clustered_covariance::{block_count, block_numbers};
-use super::point_to_surface::{PointToSurfaceSettings, TargetSurface};
+use super::point_to_surface::PointToSurfaceSettings;
+use super::target_surface::TargetSurface;
 use crate::statistics::{DEVIATIONS_PER_MEDIAN, median};
 
 /// Blocks without which no standard error is known.

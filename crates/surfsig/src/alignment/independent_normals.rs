@@ -90,7 +90,8 @@ impl PointToSurface {
 
 #[cfg(test)]
 mod tests {
-    use super::super::point_to_surface::{PointToSurfaceSettings, TargetSurface};
+    use super::super::point_to_surface::PointToSurfaceSettings;
+    use super::super::target_surface::TargetSurface;
     use super::*;
     use crate::geometry::RigidTransform;
     use crate::random::uniform;

@@ -1,11 +1,11 @@
 //! What registration, finding, odometry and recurrences share: how one surface lies on another, and how sure that is.
 //!
 //! Matches propose a transform ([`consensus`]), distributions refine it ([`gicp`]), points fit it to the surface
-//! ([`point_to_surface`]), many at once are fitted to tangent planes ([`point_to_plane`]), and [`observability`] tells in
-//! which directions nothing determines it, or, by [`independent_normals`], only errors of normals do; their variance is
-//! infinite ([`open_covariance`]). [`rivals`] are transforms that explain as much, some of them proposed by [`symmetry`];
-//! [`faces`] of buildings propose transforms, too; [`scale`] tells whether both surfaces are of one size; and [`halves`] of
-//! an overlap tell what blocks of neighbours cannot see.
+//! ([`point_to_surface`], [`target_surface`]), many at once are fitted to tangent planes ([`point_to_plane`]), and
+//! [`observability`] tells in which directions nothing determines it, or, by [`independent_normals`], only errors of
+//! normals do; their variance is infinite ([`open_covariance`]). [`rivals`] are transforms that explain as much, some
+//! of them proposed by [`symmetry`]; [`faces`] of buildings propose transforms, too; [`scale`] tells whether both
+//! surfaces are of one size; and [`halves`] of an overlap tell what blocks of neighbours cannot see.
 
 mod clustered_covariance;
 mod consensus;
@@ -26,6 +26,7 @@ mod point_to_surface;
 mod rivals;
 mod scale;
 mod symmetry;
+mod target_surface;
 
 pub(crate) use clustered_covariance::{blocks, clustered_covariance};
 pub use consensus::ConsensusSettings;
@@ -48,8 +49,9 @@ pub(crate) use open_covariance::{
     infinite_along, information_without, lengths, motions_beyond, orthonormal, unscaled,
 };
 pub(crate) use point_to_plane::{FACING_AWAY, OrientedSurface, cosine_towards, transformed};
+pub(crate) use point_to_surface::PointToSurface;
 pub use point_to_surface::PointToSurfaceSettings;
-pub(crate) use point_to_surface::{PointToSurface, TargetSurface};
 pub use rivals::{Alternative, RivalSettings};
 pub(crate) use rivals::{FittedSurface, FittedTarget, Rivals, ScaleLimits};
 pub(crate) use symmetry::{partial_symmetries, symmetries};
+pub(crate) use target_surface::TargetSurface;

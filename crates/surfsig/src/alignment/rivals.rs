@@ -2,8 +2,9 @@
 
 use super::doubt::Doubt;
 use super::explained::{Closeness, Explained, HIDDEN, explained_share};
-use super::point_to_surface::{PointToSurfaceSettings, TargetSurface};
+use super::point_to_surface::PointToSurfaceSettings;
 use super::scale::Scale;
+use super::target_surface::TargetSurface;
 use crate::geometry::RigidTransform;
 
 /// A surface to which transforms are fitted anew, from starts that may be far off.

@@ -2,7 +2,8 @@
 
 use super::clustered_covariance::{block_count, block_numbers};
 use super::observability::UNOBSERVABLE;
-use super::point_to_surface::{PointToSurfaceSettings, Residual, TargetSurface};
+use super::point_to_surface::PointToSurfaceSettings;
+use super::target_surface::{Residual, TargetSurface};
 use nalgebra::{SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 

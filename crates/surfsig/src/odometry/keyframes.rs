@@ -257,3 +257,31 @@ impl Keyframes {
 fn in_float32(points: &[[f64; 3]]) -> Vec<[f32; 3]> {
     points.iter().map(|point| point.map(|c| c as f32)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_too_many_keyframes_the_older_of_the_nearest_two_leaves() {
+        let mut settings = OdometrySettings::default();
+        settings.relocalisation.max_kept = 3;
+        let floor = (0..400).map(|i| [f64::from(i % 20) - 10.0, f64::from(i / 20) - 10.0, -4.0]);
+        let scan = ThinnedScan::of_one_moment(floor.collect(), &settings);
+        let mut keyframes = Keyframes::new(&settings, 15.0, 5.0);
+        let at = |x: f64| RigidTransform::from_rotation_vector([0.0; 3], [x, 0.0, 0.0]);
+        let mut after = |number: u32, x: f64| {
+            let is_kept = keyframes.offer(&scan, &at(x), number);
+            (is_kept, keyframes.numbers().collect::<Vec<_>>())
+        };
+        assert_eq!(after(0, 0.0), (true, vec![0]));
+        assert_eq!(after(1, 30.0), (true, vec![0, 1]));
+        assert_eq!(after(2, 50.0), (true, vec![0, 1, 2]));
+        // Nearer to another one than three tenths of the median range.
+        assert_eq!(after(3, 54.0), (false, vec![0, 1, 2]));
+        assert_eq!(after(4, 65.0), (true, vec![0, 1, 4]));
+        assert_eq!(after(5, 100.0), (true, vec![1, 4, 5]));
+        assert_eq!([1, 4, 5].map(|number| keyframes.pose(number)), [30.0, 65.0, 100.0].map(|x| Some(at(x))));
+        assert_eq!(keyframes.pose(2), None);
+    }
+}

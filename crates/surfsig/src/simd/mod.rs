@@ -10,6 +10,8 @@ pub(crate) mod products;
 pub(crate) mod select;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 mod select_wasm;
+#[cfg(target_arch = "x86_64")]
+mod select_x86;
 pub(crate) mod split;
 
 pub use instruction_set::InstructionSet;

@@ -41,7 +41,7 @@ fn partition_baseline(members: &Block, len: usize, limit: f32, inner: &mut Block
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::super::select::PACK_LEFT;
+    use super::super::select_x86::PACK_LEFT;
     use super::Block;
     use std::arch::x86_64::*;
 

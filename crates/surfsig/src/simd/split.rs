@@ -96,7 +96,7 @@ fn split_baseline(rows: Rows<'_>, ranks: Range<usize>, queries: QueryBox, inside
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::super::select::PACK_LEFT;
+    use super::super::select_x86::PACK_LEFT;
     use super::{Block, INSIDE, OUTSIDE, QueryBox, Rim, Rows};
     use std::arch::x86_64::*;
     use std::ops::Range;

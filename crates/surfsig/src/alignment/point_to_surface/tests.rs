@@ -1,4 +1,4 @@
-//! Residuals against spheres, errors against covariances.
+//! Errors against covariances.
 
 use super::*;
 
@@ -17,29 +17,6 @@ fn terrain(count: usize, noise: f64, seed: usize) -> Vec<[f64; 3]> {
             [x, y, 3.0 * (0.3 * x).sin() + 2.0 * (0.25 * y).cos() + noise * error]
         })
         .collect()
-}
-
-#[test]
-fn the_distance_is_that_to_the_sphere_through_the_points() {
-    let radius = 30.0;
-    let sphere = |x: f64, y: f64| [x, y, (radius * radius - x * x - y * y).sqrt()];
-    let points: Vec<[f64; 3]> =
-        (0..1600).map(|i| sphere(f64::from(i % 40) - 19.5, f64::from(i / 40) - 19.5)).collect();
-    let surface = TargetSurface::new(points, 1.0);
-    let settings = PointToSurfaceSettings::default();
-    for (direction, off) in [([0.1, 0.2, 1.0], 0.3), ([-0.3, 0.1, 1.0], -0.5), ([0.0, -0.4, 1.0], 0.0)] {
-        let normal = Vector3::from(direction).normalize();
-        let point: [f64; 3] = (normal * (radius + off)).into();
-        let found = surface.residual(0, point, &settings, &mut Vec::new()).unwrap();
-        let outwards = normal.dot(&found.normal).signum();
-        assert!((found.distance * outwards - off).abs() < 2e-3, "{} {off}", found.distance);
-        assert!((normal.dot(&found.normal).abs() - 1.0).abs() < 1e-4);
-        // A common error of all neighbours along the normal is one of the distance.
-        let sum: f64 = found.weights.iter().sum();
-        assert!((sum.abs() - 1.0).abs() < 0.02, "{sum}");
-    }
-    assert!(surface.residual(0, [0.0, 0.0, 40.0], &settings, &mut Vec::new()).is_none(), "too far");
-    assert!(surface.residual(0, [22.0, 0.0, 20.0], &settings, &mut Vec::new()).is_none(), "off the rim");
 }
 
 #[test]

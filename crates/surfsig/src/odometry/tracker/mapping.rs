@@ -57,9 +57,7 @@ impl Tracker {
         self.map.add(near, number);
         self.mapped.insert(step.number, (pose, step.covariance));
         self.is_at_keyframe = self.keyframes.offer(scan, &pose, number);
-        if self.is_at_keyframe {
-            self.forget_scans();
-        }
+        self.forget_scans();
         self.last_mapped = Some(pose);
         steps
     }
@@ -67,7 +65,10 @@ impl Tracker {
     /// Forgets poses of scans that are neither in the map nor in that of a keyframe: memory is that of the surroundings,
     /// however long the way is.
     fn forget_scans(&mut self) {
-        let mut needed: BTreeSet<usize> = self.map.scans().iter().map(|number| *number as usize).collect();
+        let mut in_map = self.map.scans().to_vec();
+        // Points of a scan follow each other, so that few numbers are left to be sorted.
+        in_map.dedup();
+        let mut needed: BTreeSet<usize> = in_map.into_iter().map(|number| number as usize).collect();
         needed.extend(self.keyframes.numbers());
         self.mapped.retain(|number, _| needed.contains(number));
     }
@@ -80,5 +81,58 @@ impl Tracker {
             since.translation.norm() > settings.min_translation
                 || rotation_angle(&since) > settings.min_rotation
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::scale::Scale;
+    use super::super::super::settings::OdometrySettings;
+    use super::*;
+    use crate::random::uniform;
+
+    #[test]
+    fn only_scans_of_the_surroundings_and_keyframes_have_poses_however_long_the_way_is() {
+        let mut settings = OdometrySettings { map_range: Some(12.0), ..Default::default() };
+        settings.relocalisation.max_kept = 4;
+        let floor = (0..2000).map(|i| [30.0 * (uniform(i, 0) - 0.5), 30.0 * (uniform(i, 1) - 0.5), -4.0]);
+        let scan = ThinnedScan::of_one_moment(floor.collect(), &settings);
+        let scale = Scale { voxel: 1.0, median_range: 10.0, patch_radius: 5.0 };
+        let mut tracker = Tracker::new(&settings, &scale);
+        tracker.map_range = 12.0;
+        let mut go_to = |x: f64| {
+            let step = Step {
+                number: tracker.number,
+                T_map_scan: RigidTransform::from_rotation_vector([0.0; 3], [x, 0.0, 0.0]),
+                covariance: Covariance::zeros(),
+                free_directions: Vec::new(),
+                status: ScanStatus::Tracked,
+                overlap: 1.0,
+                twist: None,
+            };
+            assert_eq!(tracker.take(&scan, &scan.points, step).len(), 1);
+            let from_sensor = |point: &[f64; 3]| Vector3::new(point[0] - x, point[1], point[2]).norm();
+            assert!(tracker.map.points().iter().all(|point| from_sensor(point) <= 12.0));
+            let keyframes: Vec<usize> = tracker.keyframes.numbers().collect();
+            let mut needed: BTreeSet<usize> =
+                tracker.map.scans().iter().map(|number| *number as usize).collect();
+            needed.extend(&keyframes);
+            let with_poses: BTreeSet<usize> = tracker.mapped.keys().copied().collect();
+            assert_eq!(with_poses, needed);
+            (keyframes, with_poses)
+        };
+        for i in 0..40 {
+            go_to(2.0 * f64::from(i));
+        }
+        let (keyframes, with_poses) = go_to(80.0);
+        assert_eq!(keyframes, [34, 36, 38, 40]);
+        // Scan 29, at 58, was the first to reach what is 11.3 voxels, as far as the floor is seen, behind 80.
+        assert!(with_poses.first().is_some_and(|first| (29..=31).contains(first)), "{with_poses:?}");
+        // To and fro, where no new keyframe comes.
+        for i in 0..40 {
+            let (keyframes, with_poses) = go_to(80.0 - 2.0 * f64::from((i + 1) % 2));
+            assert_eq!(keyframes, [34, 36, 38, 40]);
+            assert!(with_poses.len() < 20, "{with_poses:?}");
+        }
     }
 }
