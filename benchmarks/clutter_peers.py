@@ -17,9 +17,8 @@ import numpy as np
 from registration_peers import open3d_alignment
 
 PPF_STEP = 0.05
-"""Of the model's diameter: distance between its sampled points, and the step of its table of distances, as in
-Drost et al., Model globally, match locally (2010). With the 0.025 of OpenCV's example the first scene was not done
-in eight minutes."""
+"""Of the model's diameter: distance between its sampled points, and the step of its table of distances, as
+in Drost et al., Model globally, match locally (2010)."""
 PPF_SCENE_STEP = 1.0 / 5.0
 """Share of the scene's points that are reference points, as there."""
 PPF_POSES = 5

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-__all__ = ["Extraction", "FitUsed", "Status"]
-
 FloatArray = NDArray[np.float32]
 
 

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfsig import _surfsig
 from surfsig.arguments import thread_count
-from surfsig.extraction import Status
 from surfsig.field import FieldSignatures
 from surfsig.finding.scan import scan_argument
 from surfsig.point_cloud import PointCloud
+from surfsig.status import Status
 
 Array = NDArray[np.float64]
 
