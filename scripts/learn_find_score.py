@@ -46,10 +46,10 @@ RIDGE = 0.002
 SIGNS = (0, 1, -1, -1, -1, 1, 1, 1, -1, -1)
 """Of the coefficients, as few examples tell them badly: 1 of what speaks for a pose, -1 of what speaks
 against it, 0 of both."""
-SIGNS_AMONG_RIVALS = (*SIGNS, -1, 1, 1)
-"""The same of all coefficients where rivals count, too."""
-SIGNS_WITHOUT_FREE_SPACE = (0, 1, 1, 1, -1, -1, 1)
-"""The same of the coefficients where nobody knows what the sensor saw through."""
+SIGNS_AMONG_RIVALS = (0, -1, 1, 1, -1, -1, -1, -1, 1)
+"""The same of the coefficients where rivals count, too."""
+SIGNS_WITHOUT_FREE_SPACE = (0, 1, -1, 1, -1, 1)
+"""The same where nobody knows what the sensor saw through."""
 NOT_SHOWN = 3
 """Objects that are not in the scene and are looked for, too; each counts as many as are not there."""
 SHOWN = 4
@@ -164,17 +164,28 @@ def terms(measures: dict[str, Array]) -> list[Array]:
 
 def terms_among_rivals(measures: dict[str, Array]) -> list[Array]:
     """Give what `Measures::terms_among_rivals` computes."""
-    misfit = np.log(measures["misfit"] + 0.005)
-    return [*terms(measures), misfit, measures["margin_here"], measures["margin_elsewhere"]]
+    return [
+        np.ones_like(measures["visible"]),
+        measures["going_on"],
+        np.log(measures["constraint"] + 0.003),
+        measures["outline_ends"],
+        np.minimum(measures["outline_goes_on"], 0.003),
+        np.log(measures["uncovered"] + 0.02),
+        np.log(np.minimum(measures["front_contradicted"], 0.02) + 0.005),
+        np.log(measures["misfit"] + 0.005),
+        measures["margin_over_rivals"],
+    ]
 
 
 def terms_without_free_space(measures: dict[str, Array]) -> list[Array]:
     """Give what `Measures::terms_without_free_space` computes."""
     return [
         np.ones_like(measures["visible"]),
-        *(measures[name] for name in ("own_log_odds", "margin_here", "margin_elsewhere", "going_on")),
-        np.log(measures["misfit"] + 0.005),
+        measures["own_log_odds"],
+        measures["going_on"],
         np.log(measures["constraint"] + 0.003),
+        np.log(measures["misfit"] + 0.005),
+        measures["margin_over_rivals"],
     ]
 
 

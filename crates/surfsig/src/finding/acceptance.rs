@@ -3,7 +3,6 @@
 use super::evidence::{Evidence, ModelView};
 use super::examination::{Examined, Refined};
 use super::model::Model;
-use super::rival_candidates::RivalOdds;
 use super::scene::{Scene, SceneSurface};
 use super::{FindSettings, Instance, log_odds};
 use crate::alignment::{FreeDirection, PointToSurfaceSettings, TargetSurface, even_sample, infinite_along};
@@ -55,7 +54,8 @@ pub(super) struct Candidate<'a> {
     pub sought: Arc<Sought<'a>>,
     pub T_scene_model: RigidTransform,
     pub evidence: Evidence,
-    pub rivals: RivalOdds,
+    /// Logarithm of the odds of its best rival.
+    pub rival_log_odds: f64,
     /// Whether it was fitted to the scene's own points.
     pub is_fitted: bool,
 }
@@ -88,7 +88,7 @@ impl Candidate<'_> {
     fn among_rivals(&self, own: Evidence) -> Evidence {
         let is_free_space_known = self.sought.view.viewpoint.is_some();
         let (measures, log_odds) =
-            own.measures.among_rivals(own.log_odds, self.rivals, is_free_space_known);
+            own.measures.among_rivals(own.log_odds, self.rival_log_odds, is_free_space_known);
         Evidence { measures, log_odds, ..own }
     }
 }

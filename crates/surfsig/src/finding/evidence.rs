@@ -126,6 +126,14 @@ impl<'a> ModelView<'a> {
         Self { front: model.surface(&all), ..self }
     }
 
+    /// Logarithm of the odds of a transform that nothing speaks for.
+    pub fn log_odds_of_nothing(&self) -> f64 {
+        if self.viewpoint.is_some() {
+            return f64::NEG_INFINITY;
+        }
+        Measures::default().log_odds_without_free_space(self.rim.too_much, self.settings)
+    }
+
     /// Transforms, fitted to the scene's surface near them by point to plane; distances are in voxels.
     ///
     /// `most` of the samples do it. Unobservable motions are not made.
@@ -301,10 +309,7 @@ impl<'a> ModelView<'a> {
 
     /// Mean agreement in residual and normal of pairs of a sample and the scene's near it, 1 on the same surface, and
     /// [`Measures::misfit`].
-    fn agreement_and_misfit<'b>(
-        &self,
-        pairs: impl Iterator<Item = (&'b SurfacePlace, usize)>,
-    ) -> (f64, f64) {
+    fn agreement_and_misfit<'b>(&self, pairs: impl Iterator<Item = (&'b SurfacePlace, usize)>) -> (f64, f64) {
         let touching = (self.settings.touching_distance * self.scene.voxel) as f32;
         let (mut sum, mut distances) = (0.0, Vec::new());
         for (sample, near) in pairs {
@@ -372,4 +377,23 @@ fn normal_spread<'a>(normals: impl Iterator<Item = &'a [f32; 3]>) -> f64 {
         count += 1.0;
     }
     if count > 0.0 { 1.0 - (moments / count).symmetric_eigenvalues().max() } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::uniform;
+
+    #[test]
+    fn what_neighbours_share_is_told_from_noise() {
+        let noise = |i: usize| 2.0 * uniform(i, 3) - 1.0;
+        let alone: Vec<f64> = (0..8000).map(noise).collect();
+        assert!(shared_part(&alone) < 0.05, "{}", shared_part(&alone));
+        let wave = |i: usize| 0.5 * (i as f64 * PI / 400.0).sin();
+        let with_shape: Vec<f64> = (0..8000).map(|i| noise(i) + wave(i)).collect();
+        // Root mean square of a sine of amplitude 0.5.
+        let expected = 0.5 * 0.5_f64.sqrt();
+        assert!((shared_part(&with_shape) - expected).abs() < 0.02, "{}", shared_part(&with_shape));
+        assert_eq!(shared_part(&[1.0; 7]), 0.0, "too few");
+    }
 }

@@ -30,7 +30,7 @@ use acceptance::{Candidate, Sought, accepted, least_before_fit};
 use evidence::ModelView;
 use model::{MIN_POINTS, SPACINGS_PER_RADIUS};
 use proposals::{different, proposed_transforms, raw_transforms};
-use rival_candidates::RivalOdds;
+use rival_candidates::rival_log_odds;
 use scene::Scene;
 use std::sync::Arc;
 
@@ -151,12 +151,12 @@ fn candidates_of<'a>(
         let sought = Arc::new(Sought::new(number, side, last));
         let least = least_before_fit(settings);
         let good: Vec<usize> = (0..judged.len()).filter(|&i| judged[i].log_odds >= least).collect();
-        let rivals = RivalOdds::of(&sought, &aligned, &judged, &good);
-        candidates.extend(good.into_iter().zip(rivals).map(|(number, rivals)| Candidate {
+        let rivals = rival_log_odds(&sought, &aligned, &judged, &good);
+        candidates.extend(good.into_iter().zip(rivals).map(|(number, rival_log_odds)| Candidate {
             sought: Arc::clone(&sought),
             T_scene_model: aligned[number],
             evidence: judged[number],
-            rivals,
+            rival_log_odds,
             is_fitted: false,
         }));
     }

@@ -24,55 +24,33 @@ const SAME_PART: f64 = 0.5;
 const SYMMETRIC: f64 = 0.9;
 /// Distance from the model up to which they do, in its extents.
 const ON_ITSELF: f64 = 0.1;
-/// Which of the transforms elsewhere counts, by their odds: so many less one copies of the model may be in the scene beside
-/// the one that is judged.
-const ELSEWHERE: usize = 5;
 /// Logarithm of the odds below which a rival says nothing: it is also that of none.
 const NO_RIVAL: f64 = -12.0;
 
-/// Logarithms of the odds that rivals of a transform have by their own evidence.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct RivalOdds {
-    /// Of the best other transform that explains the same part of the scene, but for symmetries of the model.
-    pub here: f64,
-    /// Of the best one of the fifth best other part of the scene: the model may be there more than once.
-    pub elsewhere: f64,
-}
-
-impl RivalOdds {
-    /// Those of some of a model's transforms (T_scene_model), which have numbers.
-    pub fn of(
-        sought: &Sought<'_>,
-        transforms: &[RigidTransform],
-        evidence: &[Evidence],
-        numbers: &[usize],
-    ) -> Vec<Self> {
-        let compared = Compared::new(sought, transforms);
-        let mut rivals: Vec<usize> =
-            (0..transforms.len()).filter(|&number| evidence[number].log_odds > NO_RIVAL).collect();
-        rivals.sort_by(|&a, &b| evidence[b].log_odds.total_cmp(&evidence[a].log_odds));
-        let on_scene: Vec<Vec<&SurfacePlace>> =
-            (0..transforms.len()).into_par_iter().map(|number| compared.on_scene(number)).collect();
-        let explain_the_same =
-            |one: usize, other: usize| compared.explain_the_same(&on_scene[one], one, other);
-        let of = |&one: &usize| {
-            let (mut here, mut elsewhere) = (None, Vec::new());
-            for &other in rivals.iter().filter(|&&other| !compared.are_one(one, other)) {
-                if explain_the_same(one, other) {
-                    if here.is_none() && !compared.is_symmetry(one, other) {
-                        here = Some(other);
-                    }
-                } else if elsewhere.len() < ELSEWHERE
-                    && !elsewhere.iter().any(|&better| explain_the_same(better, other))
-                {
-                    elsewhere.push(other);
-                }
-            }
-            let odds = |rival: Option<usize>| rival.map_or(NO_RIVAL, |number| evidence[number].log_odds);
-            Self { here: odds(here), elsewhere: odds(elsewhere.get(ELSEWHERE - 1).copied()) }
+/// For some of a model's transforms (T_scene_model), which have numbers: the logarithm of the odds that the best other one
+/// has by its own evidence which explains the same part of the scene, symmetries of the model left out.
+pub(super) fn rival_log_odds(
+    sought: &Sought<'_>,
+    transforms: &[RigidTransform],
+    evidence: &[Evidence],
+    numbers: &[usize],
+) -> Vec<f64> {
+    let compared = Compared::new(sought, transforms);
+    let mut rivals: Vec<usize> =
+        (0..transforms.len()).filter(|&number| evidence[number].log_odds > NO_RIVAL).collect();
+    rivals.sort_by(|&a, &b| evidence[b].log_odds.total_cmp(&evidence[a].log_odds));
+    // Where free space is not known, next to nothing on the scene still has odds: they are those of none then.
+    let least = NO_RIVAL.max(sought.view.log_odds_of_nothing());
+    let of = |&one: &usize| {
+        let on_scene = compared.on_scene(one);
+        let is_rival = |&&other: &&usize| {
+            !compared.are_one(one, other)
+                && compared.explain_the_same(&on_scene, one, other)
+                && !compared.is_symmetry(one, other)
         };
-        numbers.par_iter().map(of).collect()
-    }
+        rivals.iter().find(is_rival).map_or(least, |&best| evidence[best].log_odds)
+    };
+    numbers.par_iter().map(of).collect()
 }
 
 /// Transforms of a model, which are compared by some of its samples.

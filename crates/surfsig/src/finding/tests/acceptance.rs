@@ -2,7 +2,7 @@
 
 use super::super::acceptance::{Candidate, Sought, refined};
 use super::super::evidence::Evidence;
-use super::super::rival_candidates::RivalOdds;
+use super::super::rival_candidates::rival_log_odds;
 use super::*;
 
 #[test]
@@ -47,26 +47,33 @@ fn rivals_explain_the_same_or_are_elsewhere_and_symmetries_are_none() {
             visible: 1.0,
             overlap: 1.0,
         });
-        RivalOdds::of(&sought, &transforms, &evidence, &[0, 1, 2, 3])
+        rival_log_odds(&sought, &transforms, &evidence, &[0, 1, 2, 3])
     };
+    // Nothing on the scene: by default 20 (0 - 0.25).
+    let none = -5.0;
     let brick = odds_of(brick());
-    assert_eq!(brick[0].here, -12.0, "half a turn is a symmetry, the second is the same: {brick:?}");
+    assert_eq!(brick[0], none, "half a turn is a symmetry, the second is the same: {brick:?}");
     let body = odds_of(body(4000));
-    assert_eq!([body[0].here, body[1].here], [3.0; 2], "the other side lies on the same points: {body:?}");
-    assert_eq!(body[3].here, -12.0, "nothing else is at the copy");
-    // One copy elsewhere is no rival: there may be some.
-    assert!(body.iter().chain(&brick).all(|odds| odds.elsewhere == -12.0));
+    assert_eq!([body[0], body[1]], [3.0; 2], "the other side lies on the same points: {body:?}");
+    assert_eq!(body[3], none, "nothing else is at the copy");
 }
 
 #[test]
 fn odds_grow_with_the_margin_over_rivals() {
-    let odds =
-        |here: f64, elsewhere: f64| Measures::default().among_rivals(2.0, RivalOdds { here, elsewhere }).1;
-    assert!(odds(-3.0, -3.0) > odds(1.5, -3.0));
-    assert!(odds(-3.0, -6.0) > odds(-3.0, -3.0));
-    assert_eq!(odds(-7.0, -7.0), odds(-12.0, -12.0), "a large margin is enough");
-    let (measures, _) = Measures::default().among_rivals(2.0, RivalOdds { here: 1.0, elsewhere: -12.0 });
-    assert_eq!([measures.own_log_odds, measures.margin_here, measures.margin_elsewhere], [2.0, 1.0, 8.0]);
+    for is_free_space_known in [true, false] {
+        let among = |own: f64, rival: f64| Measures::default().among_rivals(own, rival, is_free_space_known);
+        assert!(among(2.0, -3.0).1 > among(2.0, 1.5).1);
+        assert_eq!(among(2.0, -7.0).1, among(2.0, -12.0).1, "a large margin is enough");
+        let (measures, _) = among(2.0, 1.0);
+        assert_eq!([measures.own_log_odds, measures.margin_over_rivals], [2.0, 1.0]);
+        let misfit = Measures { misfit: 0.02, ..Default::default() };
+        assert!(misfit.among_rivals(2.0, -3.0, is_free_space_known).1 < among(2.0, -3.0).1);
+    }
+    assert_eq!(
+        Measures::default().among_rivals(-0.9, -5.0, false).1,
+        f64::NEG_INFINITY,
+        "nothing was learnt"
+    );
 }
 
 #[test]
@@ -82,7 +89,7 @@ fn a_fit_left_the_place_that_was_judged() {
         evidence: view.judged(&[start], &is_free)[0],
         sought: Arc::new(Sought::new(0, model, view)),
         T_scene_model: start,
-        rivals: RivalOdds { here: -12.0, elsewhere: -12.0 },
+        rival_log_odds: -12.0,
         is_fitted: false,
     };
     // To the points that it was judged by, and to others that lead it away.
