@@ -80,16 +80,11 @@ impl Candidate<'_> {
             .collect()
     }
 
+    /// Its evidence by the samples of the scene that are free, among its rivals.
     pub fn judged(&self, is_free: &[bool]) -> Evidence {
-        self.sought.view.judged(&[self.T_scene_model], is_free)[0]
-    }
-
-    /// Evidence with what rivals say, too.
-    fn among_rivals(&self, own: Evidence) -> Evidence {
-        let is_free_space_known = self.sought.view.viewpoint.is_some();
-        let (measures, log_odds) =
-            own.measures.among_rivals(own.log_odds, self.rival_log_odds, is_free_space_known);
-        Evidence { measures, log_odds, ..own }
+        let view = &self.sought.view;
+        view.judged(&[self.T_scene_model], is_free)[0]
+            .among_rivals(self.rival_log_odds, view.viewpoint.is_some())
     }
 }
 
@@ -167,8 +162,7 @@ pub(super) fn accepted(
             candidates.push(Candidate { evidence, ..refined.candidate });
             continue;
         }
-        let evidence = fitted.among_rivals(evidence);
-        if evidence.log_odds < least {
+        if evidence.log_odds < least || !evidence.is_enough(fitted.sought.view.viewpoint.is_some()) {
             continue;
         }
         let examined = refined.examined(evidence.support, is_free, settings);

@@ -1,7 +1,7 @@
 //! What speaks for a transform of a model: the part that the sensor saw, less what it saw through or missed.
 
 use super::FindSettings;
-use super::likelihood::Measures;
+use super::likelihood::{LEAST_WITHOUT_FREE_SPACE, Measures};
 use super::model::Model;
 use super::rim::{Rim, step_beyond_rim};
 use super::scene::SceneSurface;
@@ -67,6 +67,22 @@ impl Evidence {
     /// Of a transform that nothing speaks for.
     fn none(support: f64, visible: f64, overlap: f64) -> Self {
         Self { support, measures: Measures::default(), log_odds: f64::NEG_INFINITY, visible, overlap }
+    }
+
+    /// The same with the logarithm of the odds by all measures, where it is that by its own evidence and the best rival has
+    /// some.
+    pub fn among_rivals(self, rival_log_odds: f64, is_free_space_known: bool) -> Self {
+        if self.log_odds == f64::NEG_INFINITY {
+            return self;
+        }
+        let (measures, log_odds) =
+            self.measures.among_rivals(self.log_odds, rival_log_odds, is_free_space_known);
+        Self { measures, log_odds, ..self }
+    }
+
+    /// Whether there is as much evidence, among rivals, as the probability was learnt from.
+    pub fn is_enough(&self, is_free_space_known: bool) -> bool {
+        is_free_space_known || self.measures.own_log_odds >= LEAST_WITHOUT_FREE_SPACE
     }
 
     /// Probability that the transform is right.

@@ -150,12 +150,16 @@ fn candidates_of<'a>(
         let judged = last.judged(&aligned, &vec![true; fine.samples().len()]);
         let sought = Arc::new(Sought::new(number, side, last));
         let least = least_before_fit(settings);
-        let good: Vec<usize> = (0..judged.len()).filter(|&i| judged[i].log_odds >= least).collect();
+        let is_free_space_known = scene.viewpoint.is_some();
+        let may_be_good = |&number: &usize| {
+            judged[number].among_rivals(f64::NEG_INFINITY, is_free_space_known).log_odds >= least
+        };
+        let good: Vec<usize> = (0..judged.len()).filter(may_be_good).collect();
         let rivals = rival_log_odds(&sought, &aligned, &judged, &good);
         candidates.extend(good.into_iter().zip(rivals).map(|(number, rival_log_odds)| Candidate {
             sought: Arc::clone(&sought),
             T_scene_model: aligned[number],
-            evidence: judged[number],
+            evidence: judged[number].among_rivals(rival_log_odds, is_free_space_known),
             rival_log_odds,
             is_fitted: false,
         }));

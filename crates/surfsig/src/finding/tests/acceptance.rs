@@ -86,7 +86,7 @@ fn a_fit_left_the_place_that_was_judged() {
     let start = RigidTransform::from_rotation_vector([0.01, -0.02, 0.01], [0.01, 0.0, 0.02]);
     let is_free = vec![true; view.scene.samples().len()];
     let candidate = Candidate {
-        evidence: view.judged(&[start], &is_free)[0],
+        evidence: view.judged(&[start], &is_free)[0].among_rivals(-12.0, false),
         sought: Arc::new(Sought::new(0, model, view)),
         T_scene_model: start,
         rival_log_odds: -12.0,
