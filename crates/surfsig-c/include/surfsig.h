@@ -834,7 +834,7 @@ double surfsig_extraction_radius(const surfsig_extraction *extraction);
 int surfsig_extraction_oriented(const surfsig_extraction *extraction);
 
 /**
- * Makes options of the default values: instances with a score of 0.7 at least, all cores.
+ * Makes options of the default values: instances with a score of 0.5 at least, all cores.
  */
 surfsig_find_options *surfsig_find_options_new(void);
 

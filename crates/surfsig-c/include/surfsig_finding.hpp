@@ -10,7 +10,7 @@
 
 namespace surfsig {
 
-/** How models are prepared and looked for; by default with a score of 0.7 at least, on all cores. */
+/** How models are prepared and looked for; by default with a score of 0.5 at least, on all cores. */
 class FindOptions {
 public:
   FindOptions &score(double score) { return checked(surfsig_find_options_set_score(handle_.get(), score)); }

