@@ -171,7 +171,7 @@ def terms_among_rivals(measures: dict[str, Array]) -> list[Array]:
         measures["outline_ends"],
         np.minimum(measures["outline_goes_on"], 0.003),
         np.log(measures["uncovered"] + 0.02),
-        np.log(np.minimum(measures["front_contradicted"], 0.02) + 0.005),
+        np.minimum(measures["front_contradicted"], 0.003),
         np.log(measures["misfit"] + 0.005),
         measures["margin_over_rivals"],
     ]

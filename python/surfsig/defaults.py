@@ -50,6 +50,6 @@ RECURRENCE_CONFIDENCE = 0.99
 KEYPOINTS = 1000
 """Places that `surfsig.find_keypoints` chooses, where neither number nor distance is asked for."""
 
-INSTANCE_SCORE = 0.7
+INSTANCE_SCORE = 0.5
 """Probability that a model is where it is found, at least: of those from 0.5 to 0.7 a third were right in
 scenes that were never looked at (benchmarks/clutter.py)."""

@@ -147,7 +147,7 @@ impl<'a> ModelView<'a> {
         if self.viewpoint.is_some() {
             return f64::NEG_INFINITY;
         }
-        Measures::default().log_odds_without_free_space(self.rim.too_much, self.settings)
+        Measures::default().log_odds_without_free_space(self.settings)
     }
 
     /// Transforms, fitted to the scene's surface near them by point to plane; distances are in voxels.
@@ -303,7 +303,7 @@ impl<'a> ModelView<'a> {
         let log_odds = if seen.is_some() {
             if self.front.is_empty() { measures.log_odds_of_samples() } else { measures.log_odds() }
         } else {
-            measures.log_odds_without_free_space(self.rim.too_much, self.settings)
+            measures.log_odds_without_free_space(self.settings)
         };
         Evidence { support, measures, log_odds, visible, overlap }
     }

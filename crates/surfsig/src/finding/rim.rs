@@ -29,17 +29,17 @@ const FACING_VIEW: f64 = 0.5;
 const MIN_POINTS: usize = 8;
 /// Share of the rim where the scene goes on, from which on the model lies in a larger surface, as a box sunk in a
 /// table. Of true poses of a whole model hardly any does, but a neighbour may be flush with it.
-const TOO_MUCH: f64 = 0.4;
-/// The same of a view, which also ends where something was before it, and at its holes.
-const TOO_MUCH_OF_VIEW: f64 = 0.8;
+pub(super) const TOO_MUCH: f64 = 0.4;
+/// What such a share counts of a view, which also ends where something was before it, and at its holes.
+const OF_VIEW: f64 = 0.5;
 
 /// Points beside a model, each a step along the surface from a sample near its end.
 pub(super) struct Rim {
     /// Numbers of the samples that were stepped from.
     from: Vec<u32>,
     points: Vec<SurfacePlace>,
-    /// Share of the rim where the scene goes on, from which on the model lies in a larger surface.
-    pub too_much: f64,
+    /// What the share of it counts where the scene goes on.
+    weight: f64,
 }
 
 /// The way along the surface from a model's end to where the scene must not go on, in the scan's unit.
@@ -71,11 +71,11 @@ impl Rim {
                 }
             }
         }
-        Self { from, points, too_much: if is_closed { TOO_MUCH } else { TOO_MUCH_OF_VIEW } }
+        Self { from, points, weight: if is_closed { 1.0 } else { OF_VIEW } }
     }
 
-    /// Share of the rim where the scene goes on beyond the model under T_scene_model; 0 where it ends with it, and where
-    /// too little of the rim is seen.
+    /// Share of the rim where the scene goes on beyond the model under T_scene_model, half of it of a view; 0 where it ends
+    /// with it, and where too little of the rim is seen.
     ///
     /// `is_touching` says which samples of the model lie on the scene's surface: where the model is hidden its rim does
     /// not count. `is_free` says which samples of the scene no other instance explains.
@@ -101,6 +101,6 @@ impl Rim {
                     usize::from(f64::from(dot(&gap, &point.normal).abs()) < MAX_RESIDUAL * scene.voxel);
             }
         }
-        if asked < MIN_POINTS { 0.0 } else { going_on as f64 / asked as f64 }
+        if asked < MIN_POINTS { 0.0 } else { self.weight * going_on as f64 / asked as f64 }
     }
 }
