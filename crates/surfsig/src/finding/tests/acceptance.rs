@@ -69,11 +69,12 @@ fn odds_grow_with_the_margin_over_rivals() {
         let misfit = Measures { misfit: 0.02, ..Default::default() };
         assert!(misfit.among_rivals(2.0, -3.0, is_free_space_known).1 < among(2.0, -3.0).1);
     }
-    assert_eq!(
-        Measures::default().among_rivals(-0.9, -5.0, false).1,
-        f64::NEG_INFINITY,
-        "nothing was learnt"
-    );
+    let with_own = |own: f64| {
+        let (measures, log_odds) = Measures::default().among_rivals(own, -5.0, false);
+        Evidence { support: 0.5, measures, log_odds, visible: 1.0, overlap: 1.0 }
+    };
+    let [more, less] = [-0.8, -0.9].map(with_own);
+    assert!(more.is_enough(false) && !less.is_enough(false) && less.is_enough(true));
 }
 
 #[test]
