@@ -78,6 +78,30 @@ fn odds_grow_with_the_margin_over_rivals() {
 }
 
 #[test]
+fn an_egg_of_nearly_the_shape_of_the_model_was_found() {
+    let settings = FindSettings::default();
+    // Noise of a quarter of a voxel along the normals hides no shape.
+    let seen = |stretch: f64| {
+        let noisy = (0..).zip(body(6000)).map(|(i, (point, normal))| {
+            let point = Vector3::from([point[0], point[1], stretch * point[2]]);
+            let noise = 0.03 * (uniform(i, 1) + uniform(i, 2) - 1.0);
+            ((point + normal * noise).into(), normal)
+        });
+        surface_of(&model_of(noisy.collect()), 0.12)
+    };
+    let model = model_of(body(4000));
+    let [same, longer] = [1.0, 1.06].map(|stretch| {
+        let scene = seen(stretch);
+        let is_free = vec![true; scene.samples().len()];
+        let view = ModelView::new(&model, scene, None, usize::MAX, &settings);
+        let judged = view.judged(&[RigidTransform::identity()], &is_free)[0].among_rivals(-5.0, false);
+        (judged.measures.misfit, judged.log_odds)
+    });
+    assert!(same.0 < 0.003 && longer.0 > 0.008, "{same:?} {longer:?}");
+    assert!(longer.1 < same.1 - 2.0, "{same:?} {longer:?}");
+}
+
+#[test]
 fn a_fit_left_the_place_that_was_judged() {
     let (settings, voxel) = (FindSettings::default(), 0.12);
     let half: Vec<_> = body(6000).into_iter().filter(|(point, _)| point[0] + point[2] > 0.0).collect();
