@@ -2,6 +2,7 @@
 
 use super::FindSettings;
 use super::likelihood::{LEAST_WITHOUT_FREE_SPACE, Measures};
+use super::misfit::shared_part;
 use super::model::Model;
 use super::rim::{Rim, step_beyond_rim};
 use super::scene::SceneSurface;
@@ -22,8 +23,6 @@ const REACH: f64 = 1.2;
 const CELL: f64 = 0.5;
 /// Half the diagonal of a cell, in its edge: the farthest that a model's middle is from that of its cell.
 const HALF_DIAGONAL: f64 = 0.87;
-/// Samples in a row, next to each other, whose residuals are compared.
-const NEIGHBORS: usize = 8;
 /// Directions from which it is tried how much of a model can be seen at once.
 const VIEWS: usize = 100;
 
@@ -344,20 +343,6 @@ impl<'a> ModelView<'a> {
     }
 }
 
-/// Standard deviation of that part of residuals which neighbours have in common: noise of the sensor differs from one to
-/// the next. The residuals come in an order in which neighbours follow each other.
-fn shared_part(residuals: &[f64]) -> f64 {
-    let (mut sum, mut pairs) = (0.0, 0.0);
-    for neighbors in residuals.chunks_exact(NEIGHBORS) {
-        let total: f64 = neighbors.iter().sum();
-        let squares: f64 = neighbors.iter().map(|residual| residual * residual).sum();
-        // The products of all pairs: their mean has no part of independent noise.
-        sum += total * total - squares;
-        pairs += (NEIGHBORS * (NEIGHBORS - 1)) as f64;
-    }
-    if pairs > 0.0 { (sum / pairs).max(0.0).sqrt() } else { 0.0 }
-}
-
 /// See [`ModelView::to_motions`].
 fn to_motions(samples: &[SurfacePlace], reach: f64) -> Option<Matrix6<f64>> {
     let mut squares = Matrix6::zeros();
@@ -393,23 +378,4 @@ fn normal_spread<'a>(normals: impl Iterator<Item = &'a [f32; 3]>) -> f64 {
         count += 1.0;
     }
     if count > 0.0 { 1.0 - (moments / count).symmetric_eigenvalues().max() } else { 0.0 }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::random::uniform;
-
-    #[test]
-    fn what_neighbours_share_is_told_from_noise() {
-        let noise = |i: usize| 2.0 * uniform(i, 3) - 1.0;
-        let alone: Vec<f64> = (0..8000).map(noise).collect();
-        assert!(shared_part(&alone) < 0.05, "{}", shared_part(&alone));
-        let wave = |i: usize| 0.5 * (i as f64 * PI / 400.0).sin();
-        let with_shape: Vec<f64> = (0..8000).map(|i| noise(i) + wave(i)).collect();
-        // Root mean square of a sine of amplitude 0.5.
-        let expected = 0.5 * 0.5_f64.sqrt();
-        assert!((shared_part(&with_shape) - expected).abs() < 0.02, "{}", shared_part(&with_shape));
-        assert_eq!(shared_part(&[1.0; 7]), 0.0, "too few");
-    }
 }
