@@ -255,12 +255,9 @@ def add_unseen(examples: Examples, seed: int) -> None:
 
 
 def thinned(cloud: surfsig.PointCloud, T_found_scene: Array, voxel: float) -> surfsig.PointCloud:
-    """Move a cloud, and give the means of its points in voxels."""
+    """Move a cloud, thin it, and forget from where it was seen."""
     points = cloud.points[cloud.finite] @ T_found_scene[:3, :3].T + T_found_scene[:3, 3]
-    _, of, count = np.unique(np.floor(points / voxel), axis=0, return_inverse=True, return_counts=True)
-    sums = np.zeros((len(count), 3))
-    np.add.at(sums, of.ravel(), points)
-    return surfsig.PointCloud(sums / count[:, None])
+    return surfsig.downsample(points, voxel)
 
 
 def report(name: str, learning: Learning) -> None:
@@ -297,7 +294,7 @@ def main() -> None:
         ("among rivals", is_seen, terms_among_rivals, SIGNS_AMONG_RIVALS),
         ("without free space", ~is_seen, terms_without_free_space, SIGNS_WITHOUT_FREE_SPACE),
     ):
-        measures = {name: np.array(values)[chosen] for name, values in examples.measures.items()}
+        measures = {key: np.array(values)[chosen] for key, values in examples.measures.items()}
         right, weight = np.array(examples.right, float)[chosen], np.array(examples.weight)[chosen]
         x = np.column_stack(of(measures))
         report(name, Learning(x, right, weight, np.array(examples.scene)[chosen], signs))

@@ -12,6 +12,7 @@ __all__ = [
     "FEWEST_SURFACE_POINTS",
     "FLAT_ATOM_NOISES",
     "GOOD",
+    "INSTANCE_SCORE",
     "INSTRUCTION_SET",
     "KIND_PARAMETERS",
     "OPTIMAL",
@@ -82,6 +83,7 @@ COARSEST_STEP: float
 RESOLUTION_SAMPLES: int
 OPTIMAL: float
 FLAT_ATOM_NOISES: float
+INSTANCE_SCORE: float
 GOOD: float
 
 def coordinate_resolution(

@@ -2,6 +2,8 @@
 
 from typing import Literal
 
+from surfsig import _surfsig
+
 Axes = Literal["surface", "sensor"]
 """In which axes a paraboloid is fitted."""
 
@@ -50,6 +52,5 @@ RECURRENCE_CONFIDENCE = 0.99
 KEYPOINTS = 1000
 """Places that `surfsig.find_keypoints` chooses, where neither number nor distance is asked for."""
 
-INSTANCE_SCORE = 0.5
-"""Probability that a model is where it is found, at least: of those from 0.5 to 0.7 a third were right in
-scenes that were never looked at (benchmarks/clutter.py)."""
+INSTANCE_SCORE = _surfsig.INSTANCE_SCORE
+"""Probability that a model is where it is found, at least: it is rather right than wrong."""

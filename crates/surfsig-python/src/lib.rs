@@ -111,6 +111,7 @@ mod _surfsig {
         module.add("COARSEST_STEP", surfsig::COARSEST_STEP)?;
         module.add("INSTRUCTION_SET", surfsig::InstructionSet::detect().name())?;
         module.add("FLAT_ATOM_NOISES", surfsig::FLAT_ATOM_NOISES)?;
+        module.add("INSTANCE_SCORE", surfsig::FindSettings::default().min_score)?;
         module.add("OPTIMAL", surfsig::OPTIMAL)?;
         module.add("GOOD", surfsig::GOOD)
     }

@@ -56,8 +56,7 @@ def find_instances(
         view of it; a `Library`, or a mapping of names to clouds, for several. In the scene's unit.
     scene
         A cloud alike. Where it has a viewpoint, or one for each value of its field ``scan``, free space
-        counts, or where all of it can have been seen from its origin; otherwise only what is confirmed does,
-        and instances that are none are found, too: a higher `score` leaves them out.
+        counts, or where all of it can have been seen from its origin; otherwise only what is confirmed does.
     score
         Of an instance, at least: the probability that its pose is right.
     at_most

@@ -103,11 +103,11 @@ const ROUND: f64 = 0.1;
 const NO_CONSTRAINT: f64 = 0.003;
 /// The same of a misfit: noise leaves as much.
 const NO_MISFIT: f64 = 0.005;
+/// The same of what nothing hides.
+const FEW_UNCOVERED: f64 = 0.02;
 /// Share of the front that was seen through, or of the outline on which the scene goes on, beyond which more says no more:
 /// real sensors and models err in more ways than simulated ones.
 const ENOUGH: f64 = 0.003;
-/// The same of what nothing hides.
-const FEW_UNCOVERED: f64 = 0.02;
 /// What is added to a number of pixels before its logarithm is taken: fewer are next to nothing.
 const FEW_PIXELS: f64 = 10.0;
 /// Pixels beyond which more count no more: as many as were learnt from.
