@@ -15,7 +15,8 @@ Uses = dict[tuple[str, str], set[str]]
 """Pairs of rooms of which the first uses the second, and the files that do."""
 
 PYTHON_FLOORS = (
-    ("_surfsig", "errors", "defaults", "digits", "colors", "wkt", "progress", "status"),
+    ("_surfsig",),
+    ("errors", "defaults", "digits", "colors", "wkt", "progress", "status"),
     ("arguments", "threads"),
     ("geometry", "coordinate_system", "signature_similarity", "flat_atom", "plot"),
     ("point_cloud",),
