@@ -580,6 +580,8 @@ class FindSettings:
         cls,
         *,
         similar: int | None = None,
+        few_points: int | None = None,
+        rough_kept: int | None = None,
         rough_points: int | None = None,
         rough_voxel: float | None = None,
         proposals: int | None = None,
@@ -611,8 +613,14 @@ class FindSettings:
     def similar(self) -> int:
         """Places of the model that are matched with each place of the scene."""
     @property
-    def rough_points(self) -> int:
+    def few_points(self) -> int:
         """Points of the model by which all transforms that matches propose are judged, without alignment."""
+    @property
+    def rough_kept(self) -> int:
+        """Of these transforms, how many are judged by more points."""
+    @property
+    def rough_points(self) -> int:
+        """Those points."""
     @property
     def rough_voxel(self) -> float:
         """Voxels of that judgement in the model's extent."""

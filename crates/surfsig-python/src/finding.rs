@@ -17,6 +17,10 @@ settings_class! {
         /// Places of the model that are matched with each place of the scene.
         similar: usize = similar,
         /// Points of the model by which all transforms that matches propose are judged, without alignment.
+        few_points: usize = few_points,
+        /// Of these transforms, how many are judged by more points.
+        rough_kept: usize = rough_kept,
+        /// Those points.
         rough_points: usize = rough_points,
         /// Voxels of that judgement in the model's extent.
         rough_voxel: f64 = rough_voxel,

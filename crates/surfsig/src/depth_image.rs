@@ -137,7 +137,7 @@ pub struct DepthImage {
     /// Pixels per unit of slope.
     scale: f32,
     side: usize,
-    /// Of the scan, in the image's axes.
+    /// Those of the scan that pixels speak of, in the image's axes.
     points: Vec<SurfacePlace>,
     pixels: Vec<Pixel>,
     second_viewpoint: Option<Box<DepthImage>>,
@@ -198,10 +198,10 @@ impl DepthImage {
 
     fn fill(&mut self, points: &[SurfacePlace], own: &[bool]) {
         let side = self.side;
-        self.points = points.iter().map(|point| self.in_image_axes(point)).collect();
+        let points: Vec<SurfacePlace> = points.iter().map(|point| self.in_image_axes(point)).collect();
         let mut depths = vec![f32::INFINITY; side * side];
         let mut numbers = vec![0_u32; side * side];
-        for (number, point) in (0..).zip(&self.points) {
+        for (number, point) in (0..).zip(&points) {
             if let Some((cell, depth)) = self.project(&point.place)
                 && depth < depths[cell]
             {
@@ -236,6 +236,17 @@ impl DepthImage {
             Pixel { point, seen, ..nothing }
         };
         self.pixels = (0..side * side).map(pixel).collect();
+        // Most points are behind others, or beside the image.
+        let mut places = vec![u32::MAX; points.len()];
+        for pixel in self.pixels.iter_mut().filter(|pixel| pixel.seen != Seen::Nothing) {
+            let place = &mut places[pixel.point as usize];
+            if *place == u32::MAX {
+                *place = self.points.len() as u32;
+                self.points.push(points[pixel.point as usize]);
+            }
+            pixel.point = *place;
+        }
+        self.points.shrink_to_fit();
     }
 
     fn at(&self, pixel: &Pixel) -> &SurfacePlace {

@@ -231,6 +231,12 @@ impl<const N: usize> KdTree<N> {
     /// ```
     pub fn within(&self, point: [f64; N], reach: f64, found: &mut Vec<u32>) {
         found.clear();
+        self.each_within(point, reach, |index| found.push(index));
+        found.sort_unstable();
+    }
+
+    /// Shows the same points in the order of the tree.
+    pub fn each_within(&self, point: [f64; N], reach: f64, mut take: impl FnMut(u32)) {
         let limit = reach * reach;
         self.descend(
             point,
@@ -239,13 +245,12 @@ impl<const N: usize> KdTree<N> {
             [0.0; N],
             &mut |distance, index| {
                 if distance <= limit {
-                    found.push(index);
+                    take(index);
                 }
                 limit
             },
             &mut { limit },
         );
-        found.sort_unstable();
     }
 
     /// Shows points with their squared distances to `take`, which gives the distance up to which it wants more.

@@ -19,6 +19,7 @@ mod gicp_cloud;
 mod halves;
 mod independent_normals;
 mod least_squares;
+mod nearest_by_cell;
 mod observability;
 mod open_covariance;
 mod point_to_plane;

@@ -1,6 +1,7 @@
 //! Many transforms of one surface, each fitted to another by the distances of points from tangent planes.
 
 use super::least_squares::LinearisedDistances;
+use super::nearest_by_cell::NearestByCell;
 use crate::depth_image::{ALIKE, SurfacePlace, dot};
 use crate::geometry::RigidTransform;
 use crate::kd_tree::KdTree;
@@ -20,13 +21,21 @@ pub(crate) const FACING_AWAY: f32 = -0.2;
 pub(crate) struct OrientedSurface {
     points: Vec<SurfacePlace>,
     tree: KdTree,
+    cells: Option<NearestByCell>,
 }
 
 impl OrientedSurface {
     /// Sorts points, whose coordinates are finite.
     pub fn new(points: Vec<SurfacePlace>) -> Self {
         let positions: Vec<[f64; 3]> = points.iter().map(|point| point.place.map(f64::from)).collect();
-        Self { points, tree: KdTree::new(&positions) }
+        Self { points, tree: KdTree::new(&positions), cells: None }
+    }
+
+    /// The same, to which many transforms are aligned: the nearest points are kept in cells with an edge, up to a distance.
+    /// Correspondences are those of the cells' middles then.
+    pub fn with_cells(self, edge: f64, distance: f64) -> Self {
+        let cells = NearestByCell::new(&self.points, edge as f32, distance as f32);
+        Self { cells: Some(cells), ..self }
     }
 
     pub fn points(&self) -> &[SurfacePlace] {
@@ -40,11 +49,20 @@ impl OrientedSurface {
         found.map(|(number, _)| number as usize)
     }
 
-    /// The numbers of the points up to a distance from a place, in ascending order.
-    pub fn within(&self, place: [f64; 3], distance: f64) -> Vec<u32> {
-        let mut found = Vec::new();
-        self.tree.within(place, distance, &mut found);
-        found
+    /// The same as [`OrientedSurface::nearest`] where no cells are kept; else about the nearest of those that face about the
+    /// same way.
+    fn correspondence(&self, point: &SurfacePlace, max_distance: f64) -> Option<usize> {
+        let Some(cells) = &self.cells else { return self.nearest(point, max_distance) };
+        let number = cells.nearest(point)?;
+        let nearest = &self.points[number];
+        let gap = [0, 1, 2].map(|k| nearest.place[k] - point.place[k]);
+        let is_near = f64::from(dot(&gap, &gap)) < max_distance * max_distance;
+        (is_near && dot(&nearest.normal, &point.normal) > ALIKE).then_some(number)
+    }
+
+    /// Shows the points up to a distance from a place with their numbers, in an order that depends on the points alone.
+    pub fn each_within(&self, place: [f64; 3], distance: f64, mut take: impl FnMut(u32, &SurfacePlace)) {
+        self.tree.each_within(place, distance, |number| take(number, &self.points[number as usize]));
     }
 
     /// The transforms of a source fitted to this surface by point to plane: a step for each of the largest distances
@@ -83,7 +101,7 @@ impl OrientedSurface {
     ) -> Option<RigidTransform> {
         let correspondence = |point: &SurfacePlace| {
             let moved = transformed(transform, point);
-            let target = &self.points[self.nearest(&moved, max_distance)?];
+            let target = &self.points[self.correspondence(&moved, max_distance)?];
             let [point, foot, normal] = [moved.place, target.place, target.normal].map(vector);
             Some((point, normal, normal.dot(&(point - foot))))
         };

@@ -3,7 +3,7 @@
 use super::evidence::{Evidence, ModelView};
 use super::examination::{Examined, Refined};
 use super::model::Model;
-use super::scene::{Scene, SceneSurface};
+use super::scene::{Free, Scene, SceneSurface};
 use super::{FindSettings, Instance, log_odds};
 use crate::alignment::{FreeDirection, PointToSurfaceSettings, TargetSurface, even_sample, infinite_along};
 use crate::geometry::RigidTransform;
@@ -81,10 +81,12 @@ impl Candidate<'_> {
     }
 
     /// Its evidence by the samples of the scene that are free, among its rivals.
-    pub fn judged(&self, is_free: &[bool]) -> Evidence {
-        let view = &self.sought.view;
-        view.judged(&[self.T_scene_model], is_free)[0]
-            .among_rivals(self.rival_log_odds, view.viewpoint.is_some())
+    pub fn judged(&self, free: Free<'_>) -> Evidence {
+        self.among_its_rivals(self.sought.view.judged(&[self.T_scene_model], free)[0])
+    }
+
+    fn among_its_rivals(&self, evidence: Evidence) -> Evidence {
+        evidence.among_rivals(self.rival_log_odds, self.sought.view.viewpoint.is_some())
     }
 }
 
@@ -105,10 +107,10 @@ impl Unexplained {
         Self { surfaces }
     }
 
-    fn of(&self, candidate: &Candidate<'_>) -> &[bool] {
+    fn of(&self, candidate: &Candidate<'_>) -> Free<'_> {
         let scene = &candidate.sought.view.scene;
         let known = self.surfaces.iter().find(|(known, _)| Arc::ptr_eq(known, scene));
-        known.map_or(&[], |(_, is_free)| is_free)
+        known.map_or(Free::All, |(_, is_free)| Free::Only(is_free))
     }
 
     /// Takes away what an instance explains.
@@ -148,8 +150,8 @@ pub(super) fn accepted(
         });
         let Some(best) = best else { break };
         let candidate = candidates.remove(best);
-        let is_free = unexplained.of(&candidate);
-        let Some((refined, evidence)) = refined(&candidate, scene, &is_taken, is_free, settings) else {
+        let free = unexplained.of(&candidate);
+        let Some((refined, evidence)) = refined(&candidate, scene, &is_taken, free, settings) else {
             continue;
         };
         let fitted = &refined.candidate;
@@ -165,24 +167,39 @@ pub(super) fn accepted(
         if evidence.log_odds < least || !evidence.is_enough(fitted.sought.view.viewpoint.is_some()) {
             continue;
         }
-        let examined = refined.examined(evidence.support, is_free, settings);
+        let examined = refined.examined(evidence.support, free, settings);
         let own = fitted.near(scene.scan.points.par_iter().copied(), settings.own_distance);
         let own: Vec<usize> = own.into_iter().filter(|&number| !is_taken[number]).collect();
         own.iter().for_each(|&number| is_taken[number] = true);
         unexplained.take(fitted, settings.own_distance);
         instances.push(instance(&refined, examined, evidence, own, scene, models));
         // Only those near it have lost something.
-        let middle = fitted.T_scene_model.translation;
-        for other in &mut candidates {
+        let is_near = |other: &Candidate<'_>| {
             let reach = fitted.sought.view.reach + other.sought.view.reach;
-            if (other.T_scene_model.translation - middle).norm() < reach {
-                other.evidence = other.judged(unexplained.of(other));
-            }
-        }
+            (other.T_scene_model.translation - fitted.T_scene_model.translation).norm() < reach
+        };
+        let near = (0..candidates.len()).filter(|&number| is_near(&candidates[number])).collect();
+        judge_again(&mut candidates, near, &unexplained);
         candidates.retain(|candidate| candidate.evidence.log_odds >= least_before_fit(settings));
     }
     instances.sort_by(|a, b| b.score.total_cmp(&a.score));
     Ok(instances)
+}
+
+/// Judges candidates with given numbers by what is unexplained, those of a model at once.
+fn judge_again(candidates: &mut [Candidate<'_>], mut numbers: Vec<usize>, unexplained: &Unexplained) {
+    while let Some(&first) = numbers.first() {
+        let sought = Arc::clone(&candidates[first].sought);
+        let (same, others): (Vec<usize>, Vec<usize>) =
+            numbers.into_iter().partition(|&number| Arc::ptr_eq(&candidates[number].sought, &sought));
+        let transforms: Vec<RigidTransform> =
+            same.iter().map(|&number| candidates[number].T_scene_model).collect();
+        let judged = sought.view.judged(&transforms, unexplained.of(&candidates[first]));
+        for (number, evidence) in same.into_iter().zip(judged) {
+            candidates[number].evidence = candidates[number].among_its_rivals(evidence);
+        }
+        numbers = others;
+    }
 }
 
 /// The candidate fitted to the scene's own points, which no other instance has taken, and its evidence by the samples that
@@ -191,7 +208,7 @@ pub(super) fn refined<'a>(
     candidate: &Candidate<'a>,
     scene: &Scene<'_>,
     is_taken: &[bool],
-    is_free: &[bool],
+    free: Free<'_>,
     settings: &FindSettings,
 ) -> Option<(Refined<'a>, Evidence)> {
     let voxel = candidate.sought.view.scene.voxel;
@@ -206,7 +223,7 @@ pub(super) fn refined<'a>(
     let fit = surface.align(&sample, start, &settings.point_to_surface)?;
     let fitted =
         Candidate { T_scene_model: fit.T_target_source.inverse(), is_fitted: true, ..candidate.clone() };
-    let evidence = fitted.judged(is_free);
+    let evidence = fitted.judged(free);
     if evidence.log_odds >= candidate.evidence.log_odds - GAIN_OF_FIT {
         return Some((Refined { candidate: fitted, fit, sample }, evidence));
     }

@@ -3,9 +3,9 @@
 use super::FindSettings;
 use super::likelihood::{LEAST_WITHOUT_FREE_SPACE, Measures};
 use super::misfit::shared_part;
-use super::model::Model;
+use super::model::{Model, rung_above};
 use super::rim::{Rim, step_beyond_rim};
-use super::scene::SceneSurface;
+use super::scene::{Free, SceneSurface};
 use crate::alignment::{FACING_AWAY, cosine_towards, transformed};
 use crate::depth_image::{ALIKE, DepthImage, FACING, Front, Judgement, SurfacePlace, dot};
 use crate::geometry::RigidTransform;
@@ -21,6 +21,8 @@ use std::sync::Arc;
 const REACH: f64 = 1.2;
 /// Of these, the edge of the cells whose transforms are judged by one depth image.
 const CELL: f64 = 0.5;
+/// The same of images that are kept for all models: fewer and larger ones.
+const SHARED_CELL: f64 = 1.0;
 /// Half the diagonal of a cell, in its edge: the farthest that a model's middle is from that of its cell.
 const HALF_DIAGONAL: f64 = 0.87;
 /// Directions from which it is tried how much of a model can be seen at once.
@@ -167,12 +169,12 @@ impl<'a> ModelView<'a> {
         self.scene.surface.align_all(transforms, &some, &steps, self.viewpoint)
     }
 
-    /// Weighs transforms (T_scene_model); `is_free` says which samples of the scene no other instance explains.
-    pub fn judged(&self, transforms: &[RigidTransform], is_free: &[bool]) -> Vec<Evidence> {
+    /// Weighs transforms (T_scene_model) by the free samples of the scene.
+    pub fn judged(&self, transforms: &[RigidTransform], free: Free<'_>) -> Vec<Evidence> {
         if self.viewpoint.is_none() {
-            return transforms.par_iter().map(|transform| self.weighed(transform, None, is_free)).collect();
+            return transforms.par_iter().map(|transform| self.weighed(transform, None, free)).collect();
         }
-        self.in_images(transforms, is_free, |image, local, viewpoint, transform| {
+        self.in_images(transforms, free, |image, local, viewpoint, transform| {
             let judgement = image.judge(local, &self.samples, self.scene.voxel as f32);
             // In the model's axes only one point has to be moved.
             let from = transform.inverse().transform_point(viewpoint).map(|x| x as f32);
@@ -182,7 +184,7 @@ impl<'a> ModelView<'a> {
             let confirmed = f64::from(judgement.confirmed);
             let visible = confirmed / facing.max(confirmed).max(1e-9);
             let front = (!self.front.is_empty()).then(|| self.front(image, local));
-            self.weighed(transform, Some(&Seen { judgement, visible, cosines, front }), is_free)
+            self.weighed(transform, Some(&Seen { judgement, visible, cosines, front }), free)
         })
     }
 
@@ -193,8 +195,7 @@ impl<'a> ModelView<'a> {
 
     /// The support of each transform by depth images alone, which costs little; there is a viewpoint.
     pub fn supports(&self, transforms: &[RigidTransform]) -> Vec<f64> {
-        let all = vec![true; self.scene.samples().len()];
-        self.in_images(transforms, &all, |image, local, _, _| {
+        self.in_images(transforms, Free::All, |image, local, _, _| {
             self.support(&image.judge(local, &self.samples, self.scene.voxel as f32))
         })
     }
@@ -211,11 +212,13 @@ impl<'a> ModelView<'a> {
     fn in_images<T: Send>(
         &self,
         transforms: &[RigidTransform],
-        is_free: &[bool],
+        free: Free<'_>,
         told: impl Fn(&DepthImage, &RigidTransform, [f64; 3], &RigidTransform) -> T + Sync,
     ) -> Vec<T> {
         let Some(viewpoint) = self.viewpoint else { return Vec::new() };
-        let edge = CELL * self.reach;
+        let is_shared = self.scene.keeps_images() && matches!(free, Free::All);
+        let (step, reach) = if is_shared { rung_above(self.reach) } else { (0, self.reach) };
+        let edge = if is_shared { SHARED_CELL } else { CELL } * reach;
         let mut cells: FxHashMap<[i64; 3], Vec<usize>> = FxHashMap::default();
         for (number, transform) in transforms.iter().enumerate() {
             let cell = <[f64; 3]>::from(transform.translation).map(|x| (x / edge).round() as i64);
@@ -223,13 +226,15 @@ impl<'a> ModelView<'a> {
         }
         let of_cell = |(cell, numbers): (&[i64; 3], &Vec<usize>)| {
             let middle = cell.map(|x| x as f64 * edge);
-            let reach = self.reach + HALF_DIAGONAL * edge;
-            let image = self.scene.image(middle, reach, viewpoint, is_free);
+            let made = || self.scene.image(middle, reach + HALF_DIAGONAL * edge, viewpoint, free);
+            let shared = is_shared.then(|| self.scene.shared_image(step, *cell)).flatten();
+            let image = shared.unwrap_or_default();
+            let image = image.get_or_init(made);
             let told = |&number: &usize| {
                 let transform = &transforms[number];
                 let mut local = *transform;
                 local.translation -= Vector3::from(middle);
-                (number, told(&image, &local, viewpoint, transform))
+                (number, told(image, &local, viewpoint, transform))
             };
             numbers.iter().map(told).collect::<Vec<_>>()
         };
@@ -239,7 +244,7 @@ impl<'a> ModelView<'a> {
     }
 
     /// The evidence, by what depth images say where it is known from where all was seen.
-    fn weighed(&self, transform: &RigidTransform, seen: Option<&Seen>, is_free: &[bool]) -> Evidence {
+    fn weighed(&self, transform: &RigidTransform, seen: Option<&Seen>, free: Free<'_>) -> Evidence {
         if let Some(seen) = seen {
             let support = self.support(&seen.judgement);
             if support <= 0.0 {
@@ -254,7 +259,7 @@ impl<'a> ModelView<'a> {
         let nearest: Vec<Option<usize>> =
             (0..moved.len()).map(|sample| if faces_away(sample) { None } else { nearest(sample) }).collect();
         let is_touching: Vec<bool> =
-            nearest.iter().map(|near| near.is_some_and(|sample| is_free[sample])).collect();
+            nearest.iter().map(|near| near.is_some_and(|sample| free.has(sample))).collect();
         let share = |count: usize| count as f64 / self.samples.len().max(1) as f64;
         let overlap = share(nearest.iter().flatten().count());
         let touching = share(is_touching.iter().filter(|&&touches| touches).count());
@@ -294,7 +299,7 @@ impl<'a> ModelView<'a> {
             missing: f64::from(judgement.missing) / self.most_seen,
             agreement,
             misfit,
-            going_on: self.rim.going_on(transform, &is_touching, &self.scene, is_free),
+            going_on: self.rim.going_on(transform, &is_touching, &self.scene, free),
             roundness: normal_spread(on().map(|sample| &self.samples[sample].normal)),
             resolution: self.reach / self.scene.voxel,
             ..Measures::default()

@@ -2,6 +2,7 @@
 
 use super::FindSettings;
 use super::acceptance::Candidate;
+use super::scene::Free;
 use crate::alignment::{
     Doubt, FittedTarget, FreeDirection, GicpCloud, PointToSurface, PointToSurfaceSettings, Rivals,
     ScaleLimits, symmetries,
@@ -31,9 +32,8 @@ pub(super) struct Examined {
 }
 
 impl Refined<'_> {
-    /// Tries to refute the transform, whose support is given; `is_free` says which samples of the scene no other instance
-    /// explains.
-    pub fn examined(&self, support: f64, is_free: &[bool], settings: &FindSettings) -> Examined {
+    /// Tries to refute the transform, whose support by the free samples of the scene is given.
+    pub fn examined(&self, support: f64, free: Free<'_>, settings: &FindSettings) -> Examined {
         let numbers = some_of(self.sample.len(), settings.rivals.points);
         let some: Vec<[f64; 3]> = numbers.into_iter().map(|i| self.sample[i]).collect();
         let sought = &self.candidate.sought;
@@ -59,7 +59,7 @@ impl Refined<'_> {
         // What the sensor saw through or did not see refutes a rival, too.
         let is_as_good = |transform: &RigidTransform| {
             let rival = Candidate { T_scene_model: *transform, ..self.candidate.clone() };
-            rival.judged(is_free).support >= (1.0 - settings.rival_deficit) * support
+            rival.judged(free).support >= (1.0 - settings.rival_deficit) * support
         };
         let alternatives: Vec<RigidTransform> = rivals
             .as_good_as_the_best(&best, &proposed, |_| settings.rivals.deficit)

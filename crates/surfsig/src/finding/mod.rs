@@ -29,10 +29,10 @@ use crate::scan::CenteredScan;
 use crate::{Error, FieldPlaces, Monitor, Scan, with_threads};
 use acceptance::{Candidate, Sought, accepted, least_before_fit};
 use evidence::ModelView;
-use model::{MIN_POINTS, SPACINGS_PER_RADIUS};
+use model::{MIN_POINTS, SPACINGS_PER_RADIUS, on_ladder};
 use proposals::{different, proposed_transforms, raw_transforms};
 use rival_candidates::rival_log_odds;
-use scene::Scene;
+use scene::{Free, Scene};
 use std::sync::Arc;
 
 /// Steps of each model that [`Monitor::done`] counts; [`find_instances`] takes one more before and after all.
@@ -113,8 +113,9 @@ fn candidates_of<'a>(
     let places: Vec<Arc<FieldPlaces>> =
         model.all_places().map(|own| scene.places(own.radius, voxel)).collect::<Result<_, _>>()?;
     let fine = scene.fine_surface(voxel)?;
-    let coarse = scene.thinned_surface(voxel, settings.coarse_voxels * voxel)?;
-    let rough = scene.thinned_surface(voxel, (settings.rough_voxel * model.extent()).max(coarse.voxel))?;
+    let coarse = scene.coarse_surface(voxel, settings.coarse_voxels * voxel)?;
+    let rough = on_ladder(settings.rough_voxel * model.extent()).max(coarse.voxel);
+    let rough = scene.rough_surface(voxel, rough)?;
     monitor.add(1);
     let mut sides = vec![model];
     if !(sides[0].is_sided && scene.is_oriented) {
@@ -132,7 +133,8 @@ fn candidates_of<'a>(
             let pairs = side.all_places().zip(&places);
             let raw: Vec<RigidTransform> =
                 pairs.flat_map(|(own, seen)| raw_transforms(own, seen, settings.similar)).collect();
-            supported(&view(&rough, settings.rough_points), &raw, settings)
+            let few = view(&rough, settings.few_points);
+            supported(&few, &view(&rough, settings.rough_points), &raw, settings)
         } else {
             proposed_transforms(&side.places, &places[0], settings)
         };
@@ -148,7 +150,7 @@ fn candidates_of<'a>(
         }
         let last = view(&fine, settings.fine_points).with_front(&side);
         let aligned = last.aligned(&tried, settings.fine_distances, settings.aligned_points);
-        let judged = last.judged(&aligned, &vec![true; fine.samples().len()]);
+        let judged = last.judged(&aligned, Free::All);
         let sought = Arc::new(Sought::new(number, side, last));
         let least = least_before_fit(settings);
         let is_free_space_known = scene.viewpoint.is_some();
@@ -175,17 +177,26 @@ fn log_odds(probability: f64) -> f64 {
     (probability / (1.0 - probability)).ln()
 }
 
-/// The transforms that what the sensor saw supports most, each different from the others.
+/// The transforms that what the sensor saw supports most, each different from the others. Few points of the model choose
+/// those that more judge.
 fn supported(
+    few: &ModelView<'_>,
     view: &ModelView<'_>,
     transforms: &[RigidTransform],
     settings: &FindSettings,
 ) -> Vec<RigidTransform> {
+    let mut some = most_supported(few, transforms);
+    some.truncate(settings.rough_kept);
+    let [distance, angle] = [settings.rough_same[0] * view.reach, settings.rough_same[1]];
+    different(most_supported(view, &some).into_iter(), settings.proposals, distance, angle)
+}
+
+/// Transforms that anything supports, the most supported first.
+fn most_supported(view: &ModelView<'_>, transforms: &[RigidTransform]) -> Vec<RigidTransform> {
     let supports = view.supports(transforms);
     let mut order: Vec<usize> = (0..transforms.len()).filter(|&i| supports[i] > 0.0).collect();
     order.sort_by(|&a, &b| supports[b].total_cmp(&supports[a]));
-    let [distance, angle] = [settings.rough_same[0] * view.reach, settings.rough_same[1]];
-    different(order.into_iter().map(|i| transforms[i]), settings.proposals, distance, angle)
+    order.into_iter().map(|i| transforms[i]).collect()
 }
 
 /// Transforms, aligned by the samples of a view, that anything speaks for; the best first.
@@ -195,7 +206,7 @@ fn best_first(
     distances: (f64, f64, usize),
 ) -> impl Iterator<Item = RigidTransform> + use<> {
     let aligned = view.aligned(transforms, distances, usize::MAX);
-    let judged = view.judged(&aligned, &vec![true; view.scene.samples().len()]);
+    let judged = view.judged(&aligned, Free::All);
     let mut order: Vec<usize> = (0..aligned.len()).filter(|&i| judged[i].support > 0.0).collect();
     order.sort_by(|&a, &b| judged[b].log_odds.total_cmp(&judged[a].log_odds));
     order.into_iter().map(move |i| aligned[i])

@@ -212,7 +212,13 @@ impl Model {
     }
 }
 
-/// The nearest radius on the ladder.
-fn on_ladder(radius: f64) -> f64 {
-    LADDER.powf((radius.ln() / LADDER.ln()).round())
+/// The nearest length on the ladder.
+pub(super) fn on_ladder(length: f64) -> f64 {
+    LADDER.powf((length.ln() / LADDER.ln()).round())
+}
+
+/// The step of the ladder to the next length that is not below one, and that length.
+pub(super) fn rung_above(length: f64) -> (i32, f64) {
+    let step = (length.ln() / LADDER.ln()).ceil() as i32;
+    (step, LADDER.powi(step).max(length))
 }

@@ -1,7 +1,7 @@
 //! Where a model ends: there, the scene's surface must end as well.
 
 use super::model::Model;
-use super::scene::SceneSurface;
+use super::scene::{Free, SceneSurface};
 use crate::alignment::transformed;
 use crate::depth_image::{SurfacePlace, dot};
 use crate::geometry::{RigidTransform, axes_across};
@@ -78,13 +78,13 @@ impl Rim {
     /// with it, and where too little of the rim is seen.
     ///
     /// `is_touching` says which samples of the model lie on the scene's surface: where the model is hidden its rim does
-    /// not count. `is_free` says which samples of the scene no other instance explains.
+    /// not count. Only free samples of the scene go on.
     pub fn going_on(
         &self,
         transform: &RigidTransform,
         is_touching: &[bool],
         scene: &SceneSurface,
-        is_free: &[bool],
+        free: Free<'_>,
     ) -> f64 {
         let (mut asked, mut going_on) = (0_usize, 0_usize);
         for (&from, point) in self.from.iter().zip(&self.points) {
@@ -94,7 +94,7 @@ impl Rim {
             asked += 1;
             let point = transformed(transform, point);
             if let Some(near) = scene.surface.nearest(&point, NEAR * scene.voxel)
-                && is_free[near]
+                && free.has(near)
             {
                 let gap = [0, 1, 2].map(|k| scene.samples()[near].place[k] - point.place[k]);
                 going_on +=

@@ -11,7 +11,34 @@ use crate::visibility::{all_seen_from, estimated_viewpoint, measured_from};
 use crate::voxels::Voxels;
 use crate::{Error, FieldPlaces, Monitor};
 use nalgebra::Vector3;
-use std::sync::Arc;
+use rustc_hash::FxHashMap;
+use std::f64::consts::SQRT_2;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// Of the reach of an image, how far before and behind its middle the scene is in it.
+const LOOKED_AROUND: f64 = 2.0;
+
+/// A depth image that whoever needs it first makes.
+type SharedImage = Arc<OnceLock<DepthImage>>;
+
+/// The samples of a scene's surface that no instance explains yet.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Free<'a> {
+    /// All of them.
+    All,
+    /// Those that are marked.
+    Only(&'a [bool]),
+}
+
+impl Free<'_> {
+    /// Whether a sample is one of them.
+    pub fn has(self, sample: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::Only(marked) => marked[sample],
+        }
+    }
+}
 
 /// The surface of a scene, one sample per voxel.
 pub(super) struct SceneSurface {
@@ -19,29 +46,57 @@ pub(super) struct SceneSurface {
     pub voxel: f64,
     /// Between the points of the scan.
     pub spacing: f64,
+    /// Images of the whole scene, which all models share: by step of the ladder of their reach, and cell. Those of a fine
+    /// surface take much memory, and few transforms are judged by each; they are not kept.
+    images: Option<Mutex<FxHashMap<(i32, [i64; 3]), SharedImage>>>,
 }
 
 impl SceneSurface {
     pub fn new(samples: Vec<SurfacePlace>, voxel: f64, spacing: f64) -> Self {
-        Self { surface: OrientedSurface::new(samples), voxel, spacing }
+        Self { surface: OrientedSurface::new(samples), voxel, spacing, images: None }
+    }
+
+    fn keeping_images(self) -> Self {
+        Self { images: Some(Mutex::default()), ..self }
+    }
+
+    fn keeping_nearest(self, distance: f64) -> Self {
+        Self { surface: self.surface.with_cells(self.voxel, distance * self.voxel), ..self }
     }
 
     pub fn samples(&self) -> &[SurfacePlace] {
         self.surface.points()
     }
 
-    /// What the sensor saw around a point, about that point. `is_free` says which samples may confirm a model.
-    pub fn image(&self, middle: [f64; 3], reach: f64, viewpoint: [f64; 3], is_free: &[bool]) -> DepthImage {
+    /// The place of an image of a cell that all models share, by the step of the ladder of their reach, if it is kept.
+    pub fn shared_image(&self, step: i32, cell: [i64; 3]) -> Option<SharedImage> {
+        let mut images = self.images.as_ref()?.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(Arc::clone(images.entry((step, cell)).or_default()))
+    }
+
+    /// Whether images of the whole scene are kept.
+    pub fn keeps_images(&self) -> bool {
+        self.images.is_some()
+    }
+
+    /// What the sensor saw around a point, about that point; free samples may confirm a model.
+    pub fn image(&self, middle: [f64; 3], reach: f64, viewpoint: [f64; 3], free: Free<'_>) -> DepthImage {
         let center = middle.map(|x| x as f32);
-        let numbers = self.surface.within(middle, 2.0 * reach);
-        let about_middle = |&number: &u32| {
-            let sample = &self.samples()[number as usize];
-            SurfacePlace { place: [0, 1, 2].map(|k| sample.place[k] - center[k]), normal: sample.normal }
-        };
-        let near: Vec<SurfacePlace> = numbers.iter().map(about_middle).collect();
-        let free: Vec<bool> = numbers.iter().map(|&number| is_free[number as usize]).collect();
         let from = [0, 1, 2].map(|k| viewpoint[k] - middle[k]);
-        DepthImage::new(&near, &free, from, self.voxel, reach, None)
+        let distance = Vector3::from(from).norm();
+        let sight = (Vector3::from(from) / distance).map(|x| x as f32);
+        // The image is a square, and wider behind its middle.
+        let half_diagonal = SQRT_2 * reach * (1.0 + LOOKED_AROUND * reach / distance);
+        let widest = half_diagonal.powi(2) as f32;
+        let (mut near, mut is_free) = (Vec::new(), Vec::new());
+        self.surface.each_within(middle, LOOKED_AROUND * reach, |number, sample| {
+            let place = [0, 1, 2].map(|k| sample.place[k] - center[k]);
+            if Vector3::from(place).cross(&sight).norm_squared() <= widest {
+                near.push(SurfacePlace { place, normal: sample.normal });
+                is_free.push(free.has(number as usize));
+            }
+        });
+        DepthImage::new(&near, &is_free, from, self.voxel, reach, None)
     }
 }
 
@@ -145,14 +200,30 @@ impl<'a> Scene<'a> {
         Ok(surface)
     }
 
-    /// The same with larger voxels, from the samples of the fine one.
-    pub fn thinned_surface(&mut self, voxel: f64, coarse: f64) -> Result<Arc<SceneSurface>, Error> {
-        if let Some((_, known)) = self.surfaces.iter().find(|(of, _)| *of == coarse) {
+    /// The same with larger voxels, from the samples of the fine one, to which many transforms are aligned.
+    pub fn coarse_surface(&mut self, voxel: f64, coarse: f64) -> Result<Arc<SceneSurface>, Error> {
+        let distance = self.settings.first_distances.0;
+        self.thinned_surface(voxel, coarse, |surface| surface.keeping_nearest(distance))
+    }
+
+    /// The same, to which none are.
+    pub fn rough_surface(&mut self, voxel: f64, rough: f64) -> Result<Arc<SceneSurface>, Error> {
+        self.thinned_surface(voxel, rough, |surface| surface)
+    }
+
+    fn thinned_surface(
+        &mut self,
+        voxel: f64,
+        thinned_to: f64,
+        prepared: impl FnOnce(SceneSurface) -> SceneSurface,
+    ) -> Result<Arc<SceneSurface>, Error> {
+        if let Some((_, known)) = self.surfaces.iter().find(|(of, _)| *of == thinned_to) {
             return Ok(Arc::clone(known));
         }
-        let points = thinned(&self.samples(voxel)?.points, coarse);
-        let surface = Arc::new(SceneSurface::new(points, coarse, self.spacing));
-        self.surfaces.push((coarse, Arc::clone(&surface)));
+        let points = thinned(&self.samples(voxel)?.points, thinned_to);
+        let surface = SceneSurface::new(points, thinned_to, self.spacing).keeping_images();
+        let surface = Arc::new(prepared(surface));
+        self.surfaces.push((thinned_to, Arc::clone(&surface)));
         Ok(surface)
     }
 }

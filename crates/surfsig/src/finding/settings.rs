@@ -19,6 +19,10 @@ pub struct FindSettings {
     pub similar: usize,
     /// Points of the model by which all transforms that matches propose are judged, without alignment, where the scene's
     /// viewpoint is known.
+    pub few_points: usize,
+    /// Of these transforms, how many are judged by more points.
+    pub rough_kept: usize,
+    /// Those points.
     pub rough_points: usize,
     /// Voxels of that judgement in the model's extent: what a match's transform is off.
     pub rough_voxel: f64,
@@ -106,6 +110,8 @@ impl Default for FindSettings {
             min_score: 0.5,
             at_most: usize::MAX,
             similar: 5,
+            few_points: 25,
+            rough_kept: 8000,
             rough_points: 100,
             rough_voxel: 0.08,
             rough_same: [0.12, 0.35],

@@ -140,7 +140,7 @@ fn a_model_ends_where_the_scene_does() {
     let going_on = |scene: Vec<([f64; 3], Vector3<f64>)>, is_touching: bool, is_free: bool| {
         let scene = surface_of(&model_of(scene), 1.0);
         let free = vec![is_free; scene.samples().len()];
-        rim.going_on(&RigidTransform::identity(), &[is_touching; 400], &scene, &free)
+        rim.going_on(&RigidTransform::identity(), &[is_touching; 400], &scene, Free::Only(&free))
     };
     assert_eq!(going_on(square(0..20, 0..20), true, true), 0.0);
     assert_eq!(going_on(square(-9..29, -9..29), true, true), 0.5, "a view lies in a larger square");
@@ -174,9 +174,8 @@ fn evidence_without_a_viewpoint_is_what_touches() {
     let (voxel, scene) = (0.12, model_of(scene));
     let view = ModelView::new(&model, surface_of(&scene, voxel), None, usize::MAX, &settings);
     let off = RigidTransform::from_rotation_vector([0.01, 0.0, -0.02], [0.02, 0.01, 0.0]);
-    let is_free = vec![true; scene.samples.len()];
     let [there, far] =
-        view.judged(&[off, RigidTransform::from_rotation_vector([0.0; 3], [9.0, 0.0, 0.0])], &is_free)[..]
+        view.judged(&[off, RigidTransform::from_rotation_vector([0.0; 3], [9.0, 0.0, 0.0])], Free::All)[..]
     else {
         panic!("two transforms")
     };
@@ -194,7 +193,7 @@ fn evidence_without_a_viewpoint_is_what_touches() {
     assert!(there.score() > 0.9, "{}", there.score());
     assert_eq!((far.score(), far.support, far.overlap), (0.0, 0.0, 0.0));
     let none = vec![false; scene.samples.len()];
-    assert_eq!(view.judged(&[off], &none)[0].score(), 0.0, "another instance explains all");
+    assert_eq!(view.judged(&[off], Free::Only(&none))[0].score(), 0.0, "another instance explains all");
 }
 
 #[test]
@@ -212,7 +211,7 @@ fn free_space_speaks_against_what_is_not_there() {
     let view = ModelView::new(&model, Arc::clone(&surface), prepared.viewpoint, usize::MAX, &settings);
     let above = RigidTransform::from_rotation_vector([0.4, -1.0, 0.7], [-2.5, 0.3, 2.0]);
     let transforms = [about(poses[0]), about(poses[1]), about(above)];
-    let judged = view.judged(&transforms, &vec![true; surface.samples().len()]);
+    let judged = view.judged(&transforms, Free::All);
     assert!(judged[0].support > 0.5 && judged[1].support > 0.5, "{judged:?}");
     assert!(judged[0].score() > 0.5 && judged[1].score() > 0.5, "{judged:?}");
     assert!(judged[2].support < 0.0 && judged[2].score() == 0.0, "{judged:?}");
@@ -307,8 +306,7 @@ fn what_is_round_is_not_determined_and_a_front_ends_where_nothing_is_beyond() {
         let seen = model_of(all.iter().filter(|(_, normal)| normal.z > 0.3).copied().collect());
         let model = model_of(all);
         let view = ModelView::new(&model, surface_of(&seen, voxel), Some(viewpoint), usize::MAX, &settings);
-        let is_free = vec![true; seen.samples.len()];
-        let judge = |view: &ModelView<'_>| view.judged(&[RigidTransform::identity()], &is_free)[0].measures;
+        let judge = |view: &ModelView<'_>| view.judged(&[RigidTransform::identity()], Free::All)[0].measures;
         assert_eq!(judge(&view).pixels, 0.0, "few samples have no front");
         judge(&view.with_front(&model))
     };

@@ -92,9 +92,8 @@ fn an_egg_of_nearly_the_shape_of_the_model_was_found() {
     let model = model_of(body(4000));
     let [same, longer] = [1.0, 1.06].map(|stretch| {
         let scene = seen(stretch);
-        let is_free = vec![true; scene.samples().len()];
         let view = ModelView::new(&model, scene, None, usize::MAX, &settings);
-        let judged = view.judged(&[RigidTransform::identity()], &is_free)[0].among_rivals(-5.0, false);
+        let judged = view.judged(&[RigidTransform::identity()], Free::All)[0].among_rivals(-5.0, false);
         (judged.measures.misfit, judged.log_odds)
     });
     assert!(same.0 < 0.003 && longer.0 > 0.008, "{same:?} {longer:?}");
@@ -109,9 +108,8 @@ fn a_fit_left_the_place_that_was_judged() {
     let view =
         ModelView::new(&model, surface_of(&model_of(half.clone()), voxel), None, usize::MAX, &settings);
     let start = RigidTransform::from_rotation_vector([0.01, -0.02, 0.01], [0.01, 0.0, 0.02]);
-    let is_free = vec![true; view.scene.samples().len()];
     let candidate = Candidate {
-        evidence: view.judged(&[start], &is_free)[0].among_rivals(-12.0, false),
+        evidence: view.judged(&[start], Free::All)[0].among_rivals(-12.0, false),
         sought: Arc::new(Sought::new(0, model, view)),
         T_scene_model: start,
         rival_log_odds: -12.0,
@@ -126,7 +124,7 @@ fn a_fit_left_the_place_that_was_judged() {
         let mut scene = Scene::new(scan, 1.0, &settings, &monitor).unwrap();
         let center = std::mem::take(&mut scene.scan.center);
         scene.scan.points.iter_mut().for_each(|point| (0..3).for_each(|k| point[k] += center[k]));
-        refined(&candidate, &scene, &vec![false; points.len()], &is_free, &settings).unwrap()
+        refined(&candidate, &scene, &vec![false; points.len()], Free::All, &settings).unwrap()
     };
     let off = |transform: &RigidTransform| transform.log().iter().map(|x| x.abs()).fold(0.0, f64::max);
     let (near, evidence) = fitted_to(0.0);
