@@ -51,6 +51,8 @@ SIGNS_AMONG_RIVALS = (0, 1, -1, -1, -1, -1, 1, 1, 1)
 """The same of the coefficients where rivals count, too."""
 SIGNS_WITHOUT_FREE_SPACE = (0, 1, -1, 1, -1, 1)
 """The same where nobody knows what the sensor saw through."""
+EVEN_MARGIN = 0.5
+"""Margin over rivals at which the odds are even at most, where free space is known."""
 NOT_SHOWN = 3
 """Objects that are not in the scene and are looked for, too; each counts as many as are not there."""
 SHOWN = 4
@@ -113,11 +115,15 @@ class Learning:
     weight: Array
     scene: NDArray[np.int64]
     signs: tuple[int, ...]
+    most: Array
+    """Logarithm of the odds of each instance at most."""
 
     def without(self, chosen: NDArray[np.bool_]) -> Learning:
         """Leave some instances out."""
         keep = ~chosen
-        return Learning(self.x[keep], self.right[keep], self.weight[keep], self.scene[keep], self.signs)
+        return Learning(
+            self.x[keep], self.right[keep], self.weight[keep], self.scene[keep], self.signs, self.most[keep]
+        )
 
     def coefficients(self) -> Array:
         """Fit a logistic model whose coefficients have certain signs; x has a constant first column."""
@@ -143,7 +149,8 @@ class Learning:
         probability = np.empty(len(self.right))
         for seed in np.unique(self.scene):
             own = self.scene == seed
-            probability[own] = 1.0 / (1.0 + np.exp(-self.x[own] @ self.without(own).coefficients()))
+            log_odds = np.minimum(self.x[own] @ self.without(own).coefficients(), self.most[own])
+            probability[own] = 1.0 / (1.0 + np.exp(-log_odds))
         return probability
 
 
@@ -306,7 +313,9 @@ def main() -> None:
         measures = {key: np.array(values)[chosen] for key, values in examples.measures.items()}
         right, weight = np.array(examples.right, float)[chosen], np.array(examples.weight)[chosen]
         x = np.column_stack(of(measures))
-        report(name, Learning(x, right, weight, np.array(examples.scene)[chosen], signs))
+        is_capped = of is terms_among_rivals
+        most = measures["margin_over_rivals"] - EVEN_MARGIN if is_capped else np.full(len(x), np.inf)
+        report(name, Learning(x, right, weight, np.array(examples.scene)[chosen], signs, most))
 
 
 if __name__ == "__main__":

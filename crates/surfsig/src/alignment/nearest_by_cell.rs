@@ -105,7 +105,7 @@ impl NearestByCell {
 /// The part of a normal along one of the six directions of the axes.
 fn along(normal: &[f32; 3], way: u8) -> f32 {
     let part = normal[usize::from(way / 2)];
-    if way % 2 == 0 { part } else { -part }
+    if way & 1 == 0 { part } else { -part }
 }
 
 /// The block that a cell is in, and its place there.

@@ -220,5 +220,5 @@ pub(super) fn on_ladder(length: f64) -> f64 {
 /// The step of the ladder to the next length that is not below one, and that length.
 pub(super) fn rung_above(length: f64) -> (i32, f64) {
     let step = (length.ln() / LADDER.ln()).ceil() as i32;
-    (step, LADDER.powi(step).max(length))
+    (step, LADDER.powi(step))
 }

@@ -20,6 +20,8 @@ const LOOKED_AROUND: f64 = 2.0;
 
 /// A depth image that whoever needs it first makes.
 type SharedImage = Arc<OnceLock<DepthImage>>;
+/// Images by the step of the ladder of their reach, and their cell.
+type SharedImages = FxHashMap<(i32, [i64; 3]), SharedImage>;
 
 /// The samples of a scene's surface that no instance explains yet.
 #[derive(Debug, Clone, Copy)]
@@ -46,9 +48,8 @@ pub(super) struct SceneSurface {
     pub voxel: f64,
     /// Between the points of the scan.
     pub spacing: f64,
-    /// Images of the whole scene, which all models share: by step of the ladder of their reach, and cell. Those of a fine
-    /// surface take much memory, and few transforms are judged by each; they are not kept.
-    images: Option<Mutex<FxHashMap<(i32, [i64; 3]), SharedImage>>>,
+    /// Images of the whole scene, which all models share. Those of a fine surface take much memory, and few transforms are judged by each; they are not kept.
+    images: Option<Mutex<SharedImages>>,
 }
 
 impl SceneSurface {
@@ -100,6 +101,14 @@ impl SceneSurface {
     }
 }
 
+/// How a surface is made: from samples one voxel apart, thinned to larger voxels, and for what.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Detail {
+    Fine { voxel: f64 },
+    Coarse { voxel: f64, to: f64 },
+    Rough { voxel: f64, to: f64 },
+}
+
 /// A scan, prepared for models; what is made once for a length is kept.
 pub(super) struct Scene<'a> {
     pub scan: CenteredScan,
@@ -112,7 +121,7 @@ pub(super) struct Scene<'a> {
     monitor: &'a Monitor,
     noises: Vec<(f64, f64)>,
     samples: Vec<(f64, Arc<Samples>)>,
-    surfaces: Vec<(f64, Arc<SceneSurface>)>,
+    surfaces: Vec<(Detail, Arc<SceneSurface>)>,
     places: Vec<(f64, Arc<FieldPlaces>)>,
 }
 
@@ -191,39 +200,33 @@ impl<'a> Scene<'a> {
 
     /// Its surface with one sample per voxel.
     pub fn fine_surface(&mut self, voxel: f64) -> Result<Arc<SceneSurface>, Error> {
-        if let Some((_, known)) = self.surfaces.iter().find(|(of, _)| *of == voxel) {
-            return Ok(Arc::clone(known));
-        }
-        let samples = self.samples(voxel)?;
-        let surface = Arc::new(SceneSurface::new(samples.points.clone(), voxel, self.spacing));
-        self.surfaces.push((voxel, Arc::clone(&surface)));
-        Ok(surface)
+        self.surface(Detail::Fine { voxel })
     }
 
     /// The same with larger voxels, from the samples of the fine one, to which many transforms are aligned.
-    pub fn coarse_surface(&mut self, voxel: f64, coarse: f64) -> Result<Arc<SceneSurface>, Error> {
-        let distance = self.settings.first_distances.0;
-        self.thinned_surface(voxel, coarse, |surface| surface.keeping_nearest(distance))
+    pub fn coarse_surface(&mut self, voxel: f64, to: f64) -> Result<Arc<SceneSurface>, Error> {
+        self.surface(Detail::Coarse { voxel, to })
     }
 
     /// The same, to which none are.
-    pub fn rough_surface(&mut self, voxel: f64, rough: f64) -> Result<Arc<SceneSurface>, Error> {
-        self.thinned_surface(voxel, rough, |surface| surface)
+    pub fn rough_surface(&mut self, voxel: f64, to: f64) -> Result<Arc<SceneSurface>, Error> {
+        self.surface(Detail::Rough { voxel, to })
     }
 
-    fn thinned_surface(
-        &mut self,
-        voxel: f64,
-        thinned_to: f64,
-        prepared: impl FnOnce(SceneSurface) -> SceneSurface,
-    ) -> Result<Arc<SceneSurface>, Error> {
-        if let Some((_, known)) = self.surfaces.iter().find(|(of, _)| *of == thinned_to) {
+    fn surface(&mut self, detail: Detail) -> Result<Arc<SceneSurface>, Error> {
+        if let Some((_, known)) = self.surfaces.iter().find(|(of, _)| *of == detail) {
             return Ok(Arc::clone(known));
         }
-        let points = thinned(&self.samples(voxel)?.points, thinned_to);
-        let surface = SceneSurface::new(points, thinned_to, self.spacing).keeping_images();
-        let surface = Arc::new(prepared(surface));
-        self.surfaces.push((thinned_to, Arc::clone(&surface)));
+        let (Detail::Fine { voxel } | Detail::Coarse { voxel, .. } | Detail::Rough { voxel, .. }) = detail;
+        let samples = self.samples(voxel)?;
+        let thinned = |to| SceneSurface::new(thinned(&samples.points, to), to, self.spacing).keeping_images();
+        let surface = match detail {
+            Detail::Fine { .. } => SceneSurface::new(samples.points.clone(), voxel, self.spacing),
+            Detail::Coarse { to, .. } => thinned(to).keeping_nearest(self.settings.first_distances.0),
+            Detail::Rough { to, .. } => thinned(to),
+        };
+        let surface = Arc::new(surface);
+        self.surfaces.push((detail, Arc::clone(&surface)));
         Ok(surface)
     }
 }

@@ -102,7 +102,8 @@ fn two_half_seen_bodies_are_found_wherever_the_scene_is_and_on_any_number_of_thr
         };
         let there = moved.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
         assert!(off(there) < 5e-3, "{}", off(there));
-        assert!((here.score - there.score).abs() < 0.05);
+        // On other voxels other rivals are met.
+        assert!((here.score - there.score).abs() < 0.1, "{here:?} {there:?}");
     }
 }
 
@@ -217,6 +218,15 @@ fn free_space_speaks_against_what_is_not_there() {
     assert!(judged[2].support < 0.0 && judged[2].score() == 0.0, "{judged:?}");
     // The judgement that costs little says the same of the support.
     let supports = view.supports(&transforms);
+    // Images that are kept for all models are larger, and say nearly the same, the second time exactly.
+    let kept = prepared.rough_surface(0.15, 0.15).unwrap();
+    let of_kept = ModelView::new(&model, kept, prepared.viewpoint, usize::MAX, &settings);
+    let [first, second] = [0, 1].map(|_| of_kept.supports(&transforms));
+    assert_eq!(first, second);
+    assert!(
+        first.iter().zip(&supports).all(|(a, b)| (a - b).abs() < 0.05 * b.abs()),
+        "{first:?} {supports:?}"
+    );
     assert!(supports.iter().zip(&judged).all(|(cheap, full)| *cheap == full.support), "{supports:?}");
 }
 
