@@ -51,7 +51,7 @@ impl NearestByCell {
                 let number = all.at((cell, way));
                 for step in 0..6 {
                     let mut other = cell;
-                    other[step / 2] += if step % 2 == 0 { 1 } else { -1 };
+                    other[step / 2] = other[step / 2].saturating_add(if step % 2 == 0 { 1 } else { -1 });
                     if all.offer((other, way), number, points) {
                         next.push((other, way));
                     }

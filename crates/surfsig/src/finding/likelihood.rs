@@ -82,9 +82,9 @@ const COEFFICIENTS_OF_SAMPLES: [f64; TERMS_OF_SAMPLES] =
     [-2.87, 2.04, 1.86, -32.29, -8.12, 1.17, -25.52, 4.4];
 /// Terms of the one by which instances are accepted at last, after their fit and among rivals.
 const TERMS_AMONG_RIVALS: usize = 9;
-/// Their coefficients, from 916 instances in 30 cluttered scenes, where the library of 20 was looked for at once and objects
-/// alone, and in 60 of half hidden copies; objects of nearly the same shape were looked for, too; 573 are right. Left out
-/// scene by scene, 356 of 369 with a probability above 0.9 were right, 125 of 149 from 0.7 on, 44 of 69 from 0.5 on
+/// Their coefficients, from 838 instances in 27 cluttered scenes, where the library of 20 was looked for at once and objects
+/// alone, and in 54 of half hidden copies; objects of nearly the same shape were looked for, too; 517 are right. Left out
+/// scene by scene, 318 of 330 with a probability above 0.9 were right, 111 of 135 from 0.7 on, 44 of 67 from 0.5 on
 /// (`scripts/learn_find_score.py`).
 const COEFFICIENTS_AMONG_RIVALS: [f64; TERMS_AMONG_RIVALS] =
     [-14.22, 0.44, -544.60, -794.71, -32.97, -2.74, 7.71, 0.65, 0.25];
@@ -97,7 +97,7 @@ const COEFFICIENTS_WITHOUT_FREE_SPACE: [f64; TERMS_WITHOUT_FREE_SPACE] =
 /// Logarithm of the odds by a transform's own evidence below which nothing was learnt there: a probability of 0.3.
 pub(super) const LEAST_WITHOUT_FREE_SPACE: f64 = -0.85;
 /// Where a rival explains the same part of the scene, the odds are at most those against it: this margin is that of even ones.
-/// Of 71 instances with a margin from -1 to 1 20 are right. Chosen by the likelihood of those that were learnt from.
+/// In 30 scenes 15 of 61 instances with a margin from -1 to 1 are right. Chosen by the likelihood of these scenes' instances.
 const EVEN_MARGIN: f64 = 0.5;
 /// A margin beyond which more says no more.
 const LARGE_MARGIN: f64 = 8.0;

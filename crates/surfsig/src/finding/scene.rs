@@ -18,6 +18,9 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 /// Of the reach of an image, how far before and behind its middle the scene is in it.
 const LOOKED_AROUND: f64 = 2.0;
 
+/// Images of a surface that are kept at most, some 100 kB each: in a large scene others are made again.
+const MOST_IMAGES: usize = 2000;
+
 /// A depth image that whoever needs it first makes.
 type SharedImage = Arc<OnceLock<DepthImage>>;
 /// Images by the step of the ladder of their reach, and their cell.
@@ -72,6 +75,9 @@ impl SceneSurface {
     /// The place of an image of a cell that all models share, by the step of the ladder of their reach, if it is kept.
     pub fn shared_image(&self, step: i32, cell: [i64; 3]) -> Option<SharedImage> {
         let mut images = self.images.as_ref()?.lock().unwrap_or_else(PoisonError::into_inner);
+        if images.len() >= MOST_IMAGES && !images.contains_key(&(step, cell)) {
+            return None;
+        }
         Some(Arc::clone(images.entry((step, cell)).or_default()))
     }
 
