@@ -231,6 +231,21 @@ fn free_space_speaks_against_what_is_not_there() {
 }
 
 #[test]
+fn a_coarse_surface_was_taken_for_a_fine_one_of_the_same_voxel() {
+    let (settings, monitor) = (FindSettings::default(), Monitor::default());
+    let viewpoint = [0.5, -3.0, 14.0];
+    let (points, _) = scene(viewpoint);
+    let scan = Scan::new(PointCloud::new_f64(&points)).seen_from(viewpoint);
+    let prepared = || Scene::new(CenteredScan::new(&scan), 1.0, &settings, &monitor).unwrap();
+    let (mut alone, mut after) = (prepared(), prepared());
+    let coarse = after.coarse_surface(0.15, 0.3).unwrap();
+    let [alone, after] = [alone.fine_surface(0.3).unwrap(), after.fine_surface(0.3).unwrap()];
+    assert_eq!(alone.samples(), after.samples());
+    assert_ne!(coarse.samples(), after.samples());
+    assert!(coarse.keeps_images() && !after.keeps_images());
+}
+
+#[test]
 fn a_viewpoint_counts_where_all_can_have_been_seen_from_it() {
     let (settings, monitor) = (FindSettings::default(), Monitor::default());
     let viewpoint = [0.5, -3.0, 14.0];
