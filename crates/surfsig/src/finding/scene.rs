@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 /// Of the reach of an image, how far before and behind its middle the scene is in it.
 const LOOKED_AROUND: f64 = 2.0;
 
-/// Images of a surface that are kept at most, some 100 kB each: in a large scene others are made again.
+/// Images of a surface that are kept at most: in a large scene others are made again.
 const MOST_IMAGES: usize = 2000;
 
 /// A depth image that whoever needs it first makes.
@@ -51,7 +51,8 @@ pub(super) struct SceneSurface {
     pub voxel: f64,
     /// Between the points of the scan.
     pub spacing: f64,
-    /// Images of the whole scene, which all models share. Those of a fine surface take much memory, and few transforms are judged by each; they are not kept.
+    /// Images of the whole scene, which all models share. Those of a fine surface take much memory, and few transforms are
+    /// judged by each; they are not kept.
     images: Option<Mutex<SharedImages>>,
 }
 
