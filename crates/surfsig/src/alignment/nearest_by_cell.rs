@@ -1,110 +1,105 @@
-//! The nearest of some points, kept for every cell of space near them.
+//! The nearest of some points, kept for every cell of space that was asked for.
 //!
 //! Where many transforms of one surface are tried, the same places are asked for again and again: then a look into a table
 //! takes a small part of the time of a search in a tree.
 
 use crate::depth_image::SurfacePlace;
+use crate::kd_tree::KdTree;
 use rustc_hash::FxHashMap;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Cells along the edge of a block: cells are kept in blocks, as most of space is far from every point.
 const BLOCK: i32 = 8;
 const CELLS_OF_BLOCK: usize = (BLOCK * BLOCK * BLOCK) as usize;
-/// Layers of cells for a distance of one edge: layers grow along the axes, and other directions take longer.
-const DETOUR: f32 = 1.75;
+/// Half the diagonal of a cell, in its edge: the farthest that a place is from its cell's middle.
+const HALF_DIAGONAL: f64 = 0.87;
 /// In a cell with no point near it.
 const NONE: u32 = u32::MAX;
+/// In a cell that nobody asked for yet.
+const UNKNOWN: u32 = u32::MAX - 1;
 
 /// Of a unit normal along an axis, from which on a point is among those that face that way.
 const TOWARDS: f32 = 0.2;
 
-/// A cell, and one of the six directions of the axes.
-type Cell = ([i32; 3], u8);
+/// The cells of a block: whoever asks for one first searches for its point. All find the same one, so that it does not
+/// matter who is first.
+type Block = OnceLock<Box<[AtomicU32; CELLS_OF_BLOCK]>>;
 
 /// For each cell of a lattice and each of six directions the number of the point that is nearest to the cell's middle, of
 /// those that face about that way.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(crate) struct NearestByCell {
-    edge: f32,
-    blocks: FxHashMap<Cell, u32>,
-    cells: Vec<[u32; CELLS_OF_BLOCK]>,
+    edge: f64,
+    reach: f64,
+    ways: [Facing; 6],
+}
+
+/// The points that face about one of the six directions of the axes.
+#[derive(Debug)]
+struct Facing {
+    /// Their numbers among all points.
+    numbers: Vec<u32>,
+    tree: KdTree,
+    /// All that are near a point.
+    blocks: FxHashMap<[i32; 3], Block>,
 }
 
 impl NearestByCell {
-    /// Fills the cells up to a distance from those with points; coordinates are finite.
-    ///
-    /// Cells take the points of their neighbours, one layer after the other: where points are an edge apart, one cell in
-    /// eight has another one that is less than half an edge farther.
-    pub fn new(points: &[SurfacePlace], edge: f32, distance: f32) -> Self {
-        let mut all = Self { edge, blocks: FxHashMap::default(), cells: Vec::new() };
-        let mut layer: Vec<Cell> = Vec::new();
-        for (number, point) in (0..).zip(points) {
-            let cell = all.cell(&point.place);
-            for way in (0..6).filter(|&way| along(&point.normal, way) > TOWARDS) {
-                if all.offer((cell, way), number, points) {
-                    layer.push((cell, way));
-                }
-            }
-        }
-        for _ in 0..(DETOUR * distance / edge).ceil() as usize {
-            let mut next = Vec::new();
-            for (cell, way) in layer {
-                let number = all.at((cell, way));
-                for step in 0..6 {
-                    let mut other = cell;
-                    other[step / 2] = other[step / 2].saturating_add(if step % 2 == 0 { 1 } else { -1 });
-                    if all.offer((other, way), number, points) {
-                        next.push((other, way));
+    /// Of points with finite coordinates, for places up to a distance from them.
+    pub fn new(points: &[SurfacePlace], edge: f64, distance: f64) -> Self {
+        let ways = [0, 1, 2, 3, 4, 5].map(|way| {
+            let is_facing = |&number: &u32| along(&points[number as usize].normal, way) > TOWARDS;
+            let numbers: Vec<u32> = (0..points.len() as u32).filter(is_facing).collect();
+            let places: Vec<[f64; 3]> =
+                numbers.iter().map(|&number| points[number as usize].place.map(f64::from)).collect();
+            let mut blocks = FxHashMap::default();
+            for place in &places {
+                let [first, last] =
+                    [-distance, distance].map(|far| block_of(cell_of(place.map(|x| x + far), edge)).0);
+                for x in first[0]..=last[0] {
+                    for y in first[1]..=last[1] {
+                        for z in first[2]..=last[2] {
+                            blocks.entry([x, y, z]).or_default();
+                        }
                     }
                 }
             }
-            layer = next;
-        }
-        all
+            Facing { numbers, tree: KdTree::new(&places), blocks }
+        });
+        Self { edge, reach: distance + HALF_DIAGONAL * edge, ways }
     }
 
     /// The number of the point that is nearest to the middle of a place's cell, if any is near, of those that face about the
     /// same way.
     pub fn nearest(&self, point: &SurfacePlace) -> Option<usize> {
-        let size = |way: u8| along(&point.normal, way);
+        let size = |way: usize| along(&point.normal, way);
         let way = (1..6).fold(0, |best, way| if size(way) > size(best) { way } else { best });
-        let number = self.at((self.cell(&point.place), way));
-        (number != NONE).then_some(number as usize)
-    }
-
-    fn cell(&self, place: &[f32; 3]) -> [i32; 3] {
-        place.map(|x| (x / self.edge).floor() as i32)
-    }
-
-    fn at(&self, (cell, way): Cell) -> u32 {
+        let facing = &self.ways[way];
+        let cell = cell_of(point.place.map(f64::from), self.edge);
         let (block, offset) = block_of(cell);
-        self.blocks.get(&(block, way)).map_or(NONE, |&block| self.cells[block as usize][offset])
-    }
-
-    /// Lets a cell have a point if that is nearer than the one it has, of two as near the one with the lower number; whether
-    /// it took it.
-    fn offer(&mut self, (cell, way): Cell, number: u32, points: &[SurfacePlace]) -> bool {
-        let (block, offset) = block_of(cell);
-        let block = *self.blocks.entry((block, way)).or_insert_with(|| {
-            self.cells.push([NONE; CELLS_OF_BLOCK]);
-            self.cells.len() as u32 - 1
-        });
-        let has = &mut self.cells[block as usize][offset];
-        let edge = self.edge;
-        let square = |number: u32| -> f32 {
-            let place = &points[number as usize].place;
-            (0..3).map(|k| (place[k] - (cell[k] as f32 + 0.5) * edge).powi(2)).sum()
-        };
-        let is_nearer = *has == NONE || (*has != number && (square(number), number) < (square(*has), *has));
-        if is_nearer {
-            *has = number;
+        let cells = facing.blocks.get(&block)?;
+        let known =
+            &cells.get_or_init(|| Box::new([const { AtomicU32::new(UNKNOWN) }; CELLS_OF_BLOCK]))[offset];
+        // A number stands for itself: nothing else has to be seen by another thread.
+        let mut number = known.load(Ordering::Relaxed);
+        if number == UNKNOWN {
+            let middle = cell.map(|x| (f64::from(x) + 0.5) * self.edge);
+            let found = facing.tree.nearest(middle, self.reach);
+            number = found.map_or(NONE, |(nearest, _)| facing.numbers[nearest as usize]);
+            known.store(number, Ordering::Relaxed);
         }
-        is_nearer
+        (number != NONE).then_some(number as usize)
     }
 }
 
+fn cell_of(place: [f64; 3], edge: f64) -> [i32; 3] {
+    place.map(|x| (x / edge).floor() as i32)
+}
+
 /// The part of a normal along one of the six directions of the axes.
-fn along(normal: &[f32; 3], way: u8) -> f32 {
-    let part = normal[usize::from(way / 2)];
+fn along(normal: &[f32; 3], way: usize) -> f32 {
+    let part = normal[way / 2];
     if way & 1 == 0 { part } else { -part }
 }
 
@@ -137,7 +132,7 @@ mod tests {
     fn a_cell_has_the_point_that_is_nearest_to_its_middle_of_those_on_a_side() {
         let points = waves();
         let cells = NearestByCell::new(&points, 1.0, 4.0);
-        let (mut asked, mut same) = (0, 0);
+        let mut asked = 0;
         for i in 0..5000 {
             let place = [0, 1, 2].map(|k| (40.0 * uniform(i, k as u64 + 7) - [5.0, 20.0, 20.0][k]) as f32);
             let side = if i % 2 == 0 { 1.0 } else { -1.0 };
@@ -146,16 +141,17 @@ mod tests {
             };
             let on_side = points.iter().filter(|point| point.normal[2] * side > 0.0);
             let nearest = on_side.map(square).fold(f32::INFINITY, f32::min);
-            let found = cells.nearest(&SurfacePlace { place, normal: [0.0, 0.0, side] });
+            let asked_for = SurfacePlace { place, normal: [0.0, 0.0, side] };
+            let found = cells.nearest(&asked_for);
+            assert_eq!(cells.nearest(&asked_for), found);
             assert!(found.is_none_or(|number| points[number].normal[2] * side > 0.0));
             if nearest < 16.0 {
                 let found = square(&points[found.expect("one is near")]);
                 asked += 1;
-                same += usize::from(found == nearest);
-                assert!(found.sqrt() < nearest.sqrt() + 0.5, "{place:?} {found} {nearest}");
+                assert!(found.sqrt() < nearest.sqrt() + 1e-4, "{place:?} {found} {nearest}");
             }
         }
-        assert!(asked > 500 && same as f64 > 0.85 * f64::from(asked), "{same} of {asked}");
+        assert!(asked > 500, "{asked}");
     }
 
     #[test]
@@ -163,8 +159,9 @@ mod tests {
         let at = |place| SurfacePlace { place, normal: [0.0, 0.0, 1.0] };
         assert_eq!(NearestByCell::new(&[], 1.0, 3.0).nearest(&at([0.0; 3])), None);
         let cells = NearestByCell::new(&[at([0.5; 3])], 1.0, 1.0);
-        assert_eq!(cells.nearest(&at([2.9, 0.5, 0.0])), Some(0));
-        assert_eq!(cells.nearest(&at([3.1, 0.0, 0.0])), None);
+        // Of the cell from 1 to 2 the middle is 1 away, of the next one 2.
+        assert_eq!(cells.nearest(&at([1.9, 0.5, 0.0])), Some(0));
+        assert_eq!(cells.nearest(&at([2.1, 0.0, 0.0])), None);
         assert_eq!(cells.nearest(&at([1e30, 0.0, -1e30])), None);
         assert_eq!(cells.nearest(&SurfacePlace { place: [0.5; 3], normal: [0.0, 0.0, -1.0] }), None);
     }

@@ -17,7 +17,7 @@ const UNOBSERVABLE: f64 = 1e-3;
 pub(crate) const FACING_AWAY: f32 = -0.2;
 
 /// Points with unit normals, searched for the nearest one whose normal is alike.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(crate) struct OrientedSurface {
     points: Vec<SurfacePlace>,
     tree: KdTree,
@@ -34,7 +34,7 @@ impl OrientedSurface {
     /// The same, to which many transforms are aligned: the nearest points are kept in cells with an edge, up to a distance.
     /// Correspondences are those of the cells' middles then.
     pub fn with_cells(self, edge: f64, distance: f64) -> Self {
-        let cells = NearestByCell::new(&self.points, edge as f32, distance as f32);
+        let cells = NearestByCell::new(&self.points, edge, distance);
         Self { cells: Some(cells), ..self }
     }
 
