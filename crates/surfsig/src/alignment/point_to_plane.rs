@@ -25,10 +25,13 @@ pub(crate) struct OrientedSurface {
 }
 
 impl OrientedSurface {
-    /// Sorts points, whose coordinates are finite.
-    pub fn new(points: Vec<SurfacePlace>) -> Self {
+    /// Sorts points, whose coordinates are finite. They are in the order of the tree from then on: those near each other
+    /// are near in memory, which most searches wait for.
+    pub fn new(points: &[SurfacePlace]) -> Self {
         let positions: Vec<[f64; 3]> = points.iter().map(|point| point.place.map(f64::from)).collect();
-        Self { points, tree: KdTree::new(&positions), cells: None }
+        let mut tree = KdTree::new(&positions);
+        let points = tree.renumber().into_iter().map(|number| points[number as usize]).collect();
+        Self { points, tree, cells: None }
     }
 
     /// The same, to which many transforms are aligned: the nearest points are kept in cells with an edge, up to a distance.
@@ -168,7 +171,7 @@ mod tests {
     #[test]
     fn the_nearest_point_is_that_of_a_search_through_all() {
         let points = box_points();
-        let surface = OrientedSurface::new(points.clone());
+        let surface = OrientedSurface::new(&points);
         for (number, point) in points.iter().enumerate() {
             let asked = SurfacePlace { place: point.place.map(|x| 1.1 * x + 0.3), ..*point };
             let square = |other: &SurfacePlace| {
@@ -185,7 +188,7 @@ mod tests {
     #[test]
     fn a_box_converges_where_it_was() {
         let points = box_points();
-        let surface = OrientedSurface::new(points.clone());
+        let surface = OrientedSurface::new(&points);
         let distances: Vec<f64> = (0..12).map(|k| 4.0 * 0.9_f64.powi(k)).collect();
         let starts = [
             RigidTransform::from_rotation_vector([0.05, -0.04, 0.06], [0.8, -0.6, 0.5]),
@@ -202,7 +205,7 @@ mod tests {
         let viewpoint = [30.0, 40.0, 50.0];
         let seen = facing(&RigidTransform::identity(), &points, viewpoint);
         assert!(seen.len() < points.len() && seen.iter().all(|point| point.normal.iter().sum::<f32>() > 0.0));
-        let surface = OrientedSurface::new(seen);
+        let surface = OrientedSurface::new(&seen);
         let start = RigidTransform::from_rotation_vector([0.02, -0.01, 0.02], [0.4, -0.3, 0.2]);
         let [all, some] = [None, Some(viewpoint)]
             .map(|viewpoint| surface.align_all(&[start], &points, &[1.5; 4], viewpoint)[0]);
@@ -214,7 +217,7 @@ mod tests {
     fn a_plane_makes_no_motion_that_it_does_not_determine() {
         let plane: Vec<SurfacePlace> =
             box_points().into_iter().filter(|point| point.normal == [0.0, 0.0, 1.0]).collect();
-        let surface = OrientedSurface::new(plane.clone());
+        let surface = OrientedSurface::new(&plane);
         let start = RigidTransform::from_rotation_vector([0.0, 0.0, 0.3], [0.7, -0.4, 0.5]);
         let [found] = surface.align_all(&[start], &plane, &[2.0; 4], None)[..] else {
             panic!("one transform")

@@ -183,7 +183,8 @@ impl<'a> ModelView<'a> {
             let facing = facing as f64 / self.samples.len().max(1) as f64;
             let confirmed = f64::from(judgement.confirmed);
             let visible = confirmed / facing.max(confirmed).max(1e-9);
-            let front = (!self.front.is_empty()).then(|| self.front(image, local));
+            let is_looked_at = !self.front.is_empty() && self.support(&judgement) > 0.0;
+            let front = is_looked_at.then(|| self.front(image, local));
             self.weighed(transform, Some(&Seen { judgement, visible, cosines, front }), free)
         })
     }

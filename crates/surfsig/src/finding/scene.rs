@@ -57,7 +57,7 @@ pub(super) struct SceneSurface {
 }
 
 impl SceneSurface {
-    pub fn new(samples: Vec<SurfacePlace>, voxel: f64, spacing: f64) -> Self {
+    pub fn new(samples: &[SurfacePlace], voxel: f64, spacing: f64) -> Self {
         Self { surface: OrientedSurface::new(samples), voxel, spacing, images: None }
     }
 
@@ -226,9 +226,10 @@ impl<'a> Scene<'a> {
         }
         let (Detail::Fine { voxel } | Detail::Coarse { voxel, .. } | Detail::Rough { voxel, .. }) = detail;
         let samples = self.samples(voxel)?;
-        let thinned = |to| SceneSurface::new(thinned(&samples.points, to), to, self.spacing).keeping_images();
+        let thinned =
+            |to| SceneSurface::new(&thinned(&samples.points, to), to, self.spacing).keeping_images();
         let surface = match detail {
-            Detail::Fine { .. } => SceneSurface::new(samples.points.clone(), voxel, self.spacing),
+            Detail::Fine { .. } => SceneSurface::new(&samples.points, voxel, self.spacing),
             Detail::Coarse { to, .. } => thinned(to).keeping_nearest(self.settings.first_distances.0),
             Detail::Rough { to, .. } => thinned(to),
         };

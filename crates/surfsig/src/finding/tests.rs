@@ -130,7 +130,7 @@ fn square(columns: std::ops::Range<i32>, rows: std::ops::Range<i32>) -> Vec<([f6
 
 fn surface_of(model: &Model, voxel: f64) -> Arc<SceneSurface> {
     let all: Vec<usize> = (0..model.samples.len()).collect();
-    Arc::new(SceneSurface::new(model.surface(&all), voxel, 0.3 * voxel))
+    Arc::new(SceneSurface::new(&model.surface(&all), voxel, 0.3 * voxel))
 }
 
 #[test]
