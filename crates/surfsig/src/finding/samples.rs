@@ -20,7 +20,7 @@ const NORMAL_BALL: f64 = 3.0;
 /// Coefficients of the paraboloid in them.
 const UNKNOWNS: f64 = 6.0;
 /// Voxels along a patch's radius to which points are thinned before patches are described.
-const DESCRIPTION_VOXELS: f64 = 16.0;
+const DESCRIPTION_VOXELS: f64 = 12.0;
 /// Places with a signature along a patch's radius, in models.
 pub(super) const PLACES_OF_MODEL: f64 = 4.0;
 /// The same in scenes: each has a place of the model near it. With 2.5 there are nearly three times as many, and no more
