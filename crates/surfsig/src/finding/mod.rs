@@ -111,7 +111,7 @@ fn candidates_of<'a>(
     let model = if model.places.radius < least { model.with_radius(least, monitor)? } else { model.clone() };
     let voxel = scene.voxel(&model)?;
     let places: Vec<Arc<FieldPlaces>> =
-        model.all_places().map(|own| scene.places(own.radius, voxel)).collect::<Result<_, _>>()?;
+        model.all_places().map(|own| scene.places(own.radius)).collect::<Result<_, _>>()?;
     let fine = scene.fine_surface(voxel)?;
     let coarse = scene.coarse_surface(voxel, settings.coarse_voxels * voxel)?;
     let rough = on_ladder(settings.rough_voxel * model.extent()).max(coarse.voxel);

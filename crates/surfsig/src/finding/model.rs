@@ -1,6 +1,6 @@
 //! A model as it is looked for, prepared once.
 
-use super::samples::{PLACES_OF_MODEL, Samples, described, mean_length, noise, oriented_outwards};
+use super::samples::{PLACES_OF_MODEL, described, mean_length, noise, oriented_outwards, samples};
 use crate::depth_image::SurfacePlace;
 use crate::kd_tree::KdTree;
 use crate::scan::CenteredScan;
@@ -16,7 +16,7 @@ const LADDER: f64 = std::f64::consts::SQRT_2;
 /// a quarter to a third of the object give most right proposals (`benchmarks/clutter.py`).
 const LARGER: [i32; 2] = [1, 2];
 /// Voxels of a patch's radius between the samples of a surface.
-const VOXELS_PER_RADIUS: f64 = 16.0;
+pub(super) const VOXELS_PER_RADIUS: f64 = 16.0;
 /// Point spacings that a patch's radius has at least.
 pub(super) const SPACINGS_PER_RADIUS: f64 = 8.0;
 /// Length of the mean normal below which a surface goes all around, and has an outer side.
@@ -110,20 +110,23 @@ impl Model {
         monitor: &Monitor,
     ) -> Result<Self, Error> {
         let voxel = (radius / VOXELS_PER_RADIUS).max(spacing);
-        let samples = Samples::new(&scan, voxel, noise(&scan, voxel, monitor)?, monitor)?;
-        if samples.points.is_empty() {
+        let samples = samples(&scan, voxel, monitor)?;
+        if samples.is_empty() {
             let text = "a model's points must lie on a surface: these have no normals";
             return Err(Error::InvalidModel(text.into()));
         }
-        let places = described(&scan, &samples, radius, PLACES_OF_MODEL, monitor)?;
-        let larger =
-            |step: &i32| described(&scan, &samples, radius * LADDER.powi(*step), PLACES_OF_MODEL, monitor);
+        let noise = noise(&scan, voxel, monitor)?;
+        let places_of = |radius: f64| described(&scan, noise, radius, PLACES_OF_MODEL, monitor);
+        let places = places_of(radius)?;
         Ok(Self {
-            larger_places: LARGER.iter().map(larger).collect::<Result<_, _>>()?,
+            larger_places: LARGER
+                .iter()
+                .map(|step| places_of(radius * LADDER.powi(*step)))
+                .collect::<Result<_, _>>()?,
             center: scan.center,
             spacing,
-            samples: samples.points.iter().map(|sample| sample.place.map(f64::from)).collect(),
-            normals: samples.points.iter().map(|sample| sample.normal.map(f64::from)).collect(),
+            samples: samples.iter().map(|sample| sample.place.map(f64::from)).collect(),
+            normals: samples.iter().map(|sample| sample.normal.map(f64::from)).collect(),
             places,
             is_sided,
             points: scan.points,

@@ -26,9 +26,9 @@ pub(super) const PLACES_OF_MODEL: f64 = 4.0;
 /// The same in scenes: each has a place of the model near it. With 2.5 there are nearly three times as many, and no more
 /// objects have a right pose among those that are judged (`benchmarks/clutter.py`, seeds 500, 501, 503, 504: 25 and 26 of 31).
 pub(super) const PLACES_OF_SCENE: f64 = 1.5;
-/// Cells along a patch's radius in which normals are compared.
+/// Cells along a patch's radius in which it is told where the surface is flat.
 const CELLS_PER_RADIUS: i64 = 2;
-/// Standard deviation of the samples around a cell from their plane, in radii of a patch, up to which it is flat: as on
+/// Standard deviation of the points around a cell from their plane, in radii of a patch, up to which it is flat: as on
 /// a cap of a sphere of ten patch radii.
 const FLAT: f64 = 0.03;
 /// The same in the scan's noise: what is bent less cannot be told from a plane.
@@ -37,28 +37,24 @@ const FLAT_IN_NOISE: f64 = 2.5;
 const MEASURED: usize = 2000;
 /// Voxels along a patch's radius between points whose sides are told from each other's.
 const ORIENTATION_VOXELS: f64 = 10.0;
-/// Points of a surface, one per voxel, with unit normals on its outer side.
-#[derive(Debug, Clone)]
-pub(super) struct Samples {
-    pub points: Vec<SurfacePlace>,
-    /// Standard deviation of a scan's point from its surface.
-    pub noise: f64,
-}
 
-impl Samples {
-    /// Those of a scan, whose viewpoint or directions say on which side its normals are.
-    pub fn new(scan: &CenteredScan, voxel: f64, noise: f64, monitor: &Monitor) -> Result<Self, Error> {
-        let ball = Radius::new(NORMAL_BALL * voxel)?;
-        let thinned = scan.thinned(voxel);
-        let given = thinned.scan();
-        let options =
-            ExtractOptions { viewpoint: given.viewpoint, directions: given.directions, ..Default::default() };
-        let found = extract_within(&given.cloud, ball.into(), &Queries::All, &options, &monitor.apart())?;
-        let known = (0..found.len()).filter(|&i| found.normals[i].iter().all(|c| c.is_finite()));
-        let point =
-            |i: usize| SurfacePlace { place: thinned.points[i].map(|x| x as f32), normal: found.normals[i] };
-        Ok(Self { points: known.map(point).collect(), noise })
-    }
+/// Points of a scan's surface, one per voxel, with unit normals on its outer side; its viewpoint or directions say which
+/// that is.
+pub(super) fn samples(
+    scan: &CenteredScan,
+    voxel: f64,
+    monitor: &Monitor,
+) -> Result<Vec<SurfacePlace>, Error> {
+    let ball = Radius::new(NORMAL_BALL * voxel)?;
+    let thinned = scan.thinned(voxel);
+    let given = thinned.scan();
+    let options =
+        ExtractOptions { viewpoint: given.viewpoint, directions: given.directions, ..Default::default() };
+    let found = extract_within(&given.cloud, ball.into(), &Queries::All, &options, &monitor.apart())?;
+    let known = (0..found.len()).filter(|&i| found.normals[i].iter().all(|c| c.is_finite()));
+    let point =
+        |i: usize| SurfacePlace { place: thinned.points[i].map(|x| x as f32), normal: found.normals[i] };
+    Ok(known.map(point).collect())
 }
 
 /// Standard deviation of the points from the surface around them, in balls for samples one voxel apart; the median of
@@ -77,16 +73,18 @@ pub(super) fn noise(scan: &CenteredScan, voxel: f64, monitor: &Monitor) -> Resul
     Ok(median((0..found.len()).filter_map(deviation).collect()).unwrap_or(0.0))
 }
 
-/// Places all over a scan with their signatures, but where its surface is flat: a patch of a plane is nowhere.
+/// Places all over a scan with their signatures, but where its surface is flat: a patch of a plane is nowhere. `noise` is
+/// the scan's.
 pub(super) fn described(
     scan: &CenteredScan,
-    samples: &Samples,
+    noise: f64,
     radius: f64,
     places_per_radius: f64,
     monitor: &Monitor,
 ) -> Result<FieldPlaces, Error> {
-    let cells = BentCells::new(samples, radius);
-    let thinned = scan.thinned(radius / DESCRIPTION_VOXELS).some(|point| cells.is_around(point));
+    let thinned = scan.thinned(radius / DESCRIPTION_VOXELS);
+    let cells = BentCells::new(&thinned.points, noise, radius);
+    let thinned = thinned.some(|point| cells.is_around(point));
     let given = thinned.scan();
     let mut indices = voxel_representatives(&given.cloud, Radius::new(radius / places_per_radius)?)?;
     indices.retain(|&i| cells.is_bent(&thinned.points[i as usize]));
@@ -101,7 +99,7 @@ pub(super) fn described(
 /// Where a surface is bent, in cells of a part of a patch's radius.
 struct BentCells {
     edge: f64,
-    /// Cells around which samples are off a plane.
+    /// Cells around which points are off a plane.
     bent: FxHashSet<[i64; 3]>,
     /// Those and the cells that patches there reach.
     around: FxHashSet<[i64; 3]>,
@@ -145,16 +143,15 @@ impl Spread {
 }
 
 impl BentCells {
-    fn new(samples: &Samples, radius: f64) -> Self {
+    fn new(points: &[[f64; 3]], noise: f64, radius: f64) -> Self {
         let edge = radius / CELLS_PER_RADIUS as f64;
         let mut spreads: FxHashMap<[i64; 3], Spread> = FxHashMap::default();
-        for sample in &samples.points {
-            let point = sample.place.map(f64::from);
-            let cell = voxel_of(&point, edge);
+        for point in points {
+            let cell = voxel_of(point, edge);
             let middle = Vector3::from(cell.map(|x| x as f64 * edge));
-            spreads.entry(cell).or_insert(Spread::NONE).add(Vector3::from(point) - middle);
+            spreads.entry(cell).or_insert(Spread::NONE).add(Vector3::from(*point) - middle);
         }
-        let flat = (FLAT * radius).max(FLAT_IN_NOISE * samples.noise);
+        let flat = (FLAT * radius).max(FLAT_IN_NOISE * noise);
         let is_bent = |cell: &[i64; 3]| {
             let mut total = Spread::NONE;
             for other in block(*cell, CELLS_PER_RADIUS) {
@@ -223,18 +220,12 @@ mod tests {
     #[test]
     fn only_what_is_near_a_bend_is_bent() {
         // A floor and a wall that meet at x = 10.
-        let floor = (0..40 * 40)
-            .map(|i| ([0.25 * f64::from(i % 40), 0.25 * f64::from(i / 40), 0.0], [0.0, 0.0, 1.0]));
-        let wall = (0..40 * 40)
-            .map(|i| ([10.0, 0.25 * f64::from(i % 40), 0.25 * f64::from(i / 40)], [-1.0, 0.0, 0.0]));
-        let samples: Vec<SurfacePlace> = floor
-            .chain(wall)
-            .map(|(place, normal)| SurfacePlace { place: place.map(|x| x as f32), normal })
-            .collect();
-        let samples = Samples { points: samples, noise: 0.0 };
-        let cells = BentCells::new(&samples, 1.0);
-        for sample in &samples.points {
-            let point = sample.place.map(f64::from);
+        let square = || (0..40 * 40).map(|i| [0.25 * f64::from(i % 40), 0.25 * f64::from(i / 40)]);
+        let floor = square().map(|[x, y]| [x, y, 0.0]);
+        let wall = square().map(|[y, z]| [10.0, y, z]);
+        let points: Vec<[f64; 3]> = floor.chain(wall).collect();
+        let cells = BentCells::new(&points, 0.0, 1.0);
+        for point in points {
             let to_bend = (10.0 - point[0]).max(point[2]);
             // A patch of radius 1 that reaches the bend, and none that is far from doing so.
             assert!(cells.is_bent(&point) || to_bend > 1.0, "{point:?}");
@@ -255,9 +246,9 @@ mod tests {
         );
         let noise = noise(&scan, 2.0, &Monitor::default()).unwrap();
         assert!((noise - 0.2).abs() < 0.02, "{noise}");
-        let found = Samples::new(&scan, 2.0, noise, &Monitor::default()).unwrap();
+        let found = samples(&scan, 2.0, &Monitor::default()).unwrap();
         // The surface is in one layer of voxels or in two.
-        assert!((800..2000).contains(&found.points.len()), "{}", found.points.len());
-        assert!(found.points.iter().all(|sample| sample.normal[2] > 0.8));
+        assert!((800..2000).contains(&found.len()), "{}", found.len());
+        assert!(found.iter().all(|sample| sample.normal[2] > 0.8));
     }
 }

@@ -1,8 +1,8 @@
 //! A scene as models are looked for in it: its surface, and what its sensor saw.
 
 use super::FindSettings;
-use super::model::Model;
-use super::samples::{PLACES_OF_SCENE, Samples, described, noise, oriented_outwards};
+use super::model::{Model, VOXELS_PER_RADIUS};
+use super::samples::{PLACES_OF_SCENE, described, noise, oriented_outwards, samples};
 use crate::alignment::OrientedSurface;
 use crate::depth_image::{DepthImage, SurfacePlace};
 use crate::scan::CenteredScan;
@@ -127,7 +127,7 @@ pub(super) struct Scene<'a> {
     settings: &'a FindSettings,
     monitor: &'a Monitor,
     noises: Vec<(f64, f64)>,
-    samples: Vec<(f64, Arc<Samples>)>,
+    samples: Vec<(f64, Arc<Vec<SurfacePlace>>)>,
     surfaces: Vec<(Detail, Arc<SceneSurface>)>,
     places: Vec<(f64, Arc<FieldPlaces>)>,
 }
@@ -175,13 +175,13 @@ impl<'a> Scene<'a> {
         Ok(voxel.max(self.settings.noises_per_voxel * self.noise(voxel)?))
     }
 
-    /// Its places with signatures of patches of a radius; `voxel` is that of the samples that tell where it is flat.
-    pub fn places(&mut self, radius: f64, voxel: f64) -> Result<Arc<FieldPlaces>, Error> {
+    /// Its places with signatures of patches of a radius, the same for all models.
+    pub fn places(&mut self, radius: f64) -> Result<Arc<FieldPlaces>, Error> {
         if let Some((_, known)) = self.places.iter().find(|(of, _)| *of == radius) {
             return Ok(Arc::clone(known));
         }
-        let samples = self.samples(voxel)?;
-        let places = Arc::new(described(&self.scan, &samples, radius, PLACES_OF_SCENE, self.monitor)?);
+        let noise = self.noise(radius / VOXELS_PER_RADIUS)?;
+        let places = Arc::new(described(&self.scan, noise, radius, PLACES_OF_SCENE, self.monitor)?);
         self.places.push((radius, Arc::clone(&places)));
         Ok(places)
     }
@@ -195,12 +195,11 @@ impl<'a> Scene<'a> {
         Ok(noise)
     }
 
-    fn samples(&mut self, voxel: f64) -> Result<Arc<Samples>, Error> {
+    fn samples(&mut self, voxel: f64) -> Result<Arc<Vec<SurfacePlace>>, Error> {
         if let Some((_, known)) = self.samples.iter().find(|(of, _)| *of == voxel) {
             return Ok(Arc::clone(known));
         }
-        let noise = self.noise(voxel)?;
-        let samples = Arc::new(Samples::new(&self.scan, voxel, noise, self.monitor)?);
+        let samples = Arc::new(samples(&self.scan, voxel, self.monitor)?);
         self.samples.push((voxel, Arc::clone(&samples)));
         Ok(samples)
     }
@@ -226,10 +225,9 @@ impl<'a> Scene<'a> {
         }
         let (Detail::Fine { voxel } | Detail::Coarse { voxel, .. } | Detail::Rough { voxel, .. }) = detail;
         let samples = self.samples(voxel)?;
-        let thinned =
-            |to| SceneSurface::new(&thinned(&samples.points, to), to, self.spacing).keeping_images();
+        let thinned = |to| SceneSurface::new(&thinned(&samples, to), to, self.spacing).keeping_images();
         let surface = match detail {
-            Detail::Fine { .. } => SceneSurface::new(&samples.points, voxel, self.spacing),
+            Detail::Fine { .. } => SceneSurface::new(&samples, voxel, self.spacing),
             Detail::Coarse { to, .. } => thinned(to).keeping_nearest(self.settings.first_distances.0),
             Detail::Rough { to, .. } => thinned(to),
         };

@@ -107,6 +107,28 @@ fn two_half_seen_bodies_are_found_wherever_the_scene_is_and_on_any_number_of_thr
     }
 }
 
+#[test]
+fn instances_depended_on_which_model_was_looked_for_first() {
+    let viewpoint = [0.5, -3.0, 14.0];
+    let (points, _) = scene(viewpoint);
+    let monitor = Monitor::default();
+    // The larger patches of the dense model are as large as the smaller ones of the other; their voxels differ.
+    let [dense, sparse] = [5000, 1000].map(|count| {
+        let model: Vec<[f64; 3]> = body(count).into_iter().map(|(point, _)| point).collect();
+        Model::new(&Scan::new(PointCloud::new_f64(&model)), None, &monitor).unwrap()
+    });
+    let is_shared = |places: &FieldPlaces| places.radius == sparse.places.radius;
+    assert!(dense.larger_places.iter().any(is_shared) && dense.spacing < 0.6 * sparse.spacing);
+    let scan = Scan::new(PointCloud::new_f64(&points)).seen_from(viewpoint);
+    let found = |models: [&Model; 2]| {
+        find_instances(&models, &scan, &FindSettings::default(), &monitor).unwrap()
+    };
+    let (one_way, mut other_way) = (found([&dense, &sparse]), found([&sparse, &dense]));
+    assert_eq!(one_way.len(), 2);
+    other_way.iter_mut().for_each(|instance| instance.model = 1 - instance.model);
+    assert_eq!(one_way, other_way);
+}
+
 /// A model without signatures: samples with their normals.
 fn model_of(samples: Vec<([f64; 3], Vector3<f64>)>) -> Model {
     let (samples, normals): (Vec<[f64; 3]>, Vec<[f64; 3]>) =
