@@ -63,11 +63,6 @@ impl OrientedSurface {
         (is_near && dot(&nearest.normal, &point.normal) > ALIKE).then_some(number)
     }
 
-    /// Shows the points up to a distance from a place with their numbers, in an order that depends on the points alone.
-    pub fn each_within(&self, place: [f64; 3], distance: f64, mut take: impl FnMut(u32, &SurfacePlace)) {
-        self.tree.each_within(place, distance, |number| take(number, &self.points[number as usize]));
-    }
-
     /// The transforms of a source fitted to this surface by point to plane: a step for each of the largest distances
     /// between correspondences. Motions that the correspondences do not determine are not made.
     ///

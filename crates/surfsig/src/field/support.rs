@@ -7,7 +7,7 @@ use crate::{Error, ExtractOptions, Monitor, PointCloud, Queries, Radius, voxel_r
 
 /// Points of the support across a patch's radius: so many that its bins are filled, and patches of dense scans
 /// cost no more than others. One for each voxel, so that density has no weight.
-const PER_RADIUS: f64 = 8.0;
+const PER_RADIUS: f64 = 10.0;
 
 /// Balls of curvature within a patch's radius.
 const CURVATURE_BALLS: f64 = 4.0;

@@ -9,6 +9,7 @@ mod acceptance;
 mod evidence;
 mod examination;
 mod likelihood;
+mod lines_of_sight;
 mod misfit;
 mod model;
 mod proposals;

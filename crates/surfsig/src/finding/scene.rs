@@ -1,6 +1,7 @@
 //! A scene as models are looked for in it: its surface, and what its sensor saw.
 
 use super::FindSettings;
+use super::lines_of_sight::LinesOfSight;
 use super::model::{Model, VOXELS_PER_RADIUS};
 use super::samples::{PLACES_OF_SCENE, described, noise, oriented_outwards, samples};
 use crate::alignment::OrientedSurface;
@@ -14,9 +15,6 @@ use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 use std::f64::consts::SQRT_2;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-
-/// Of the reach of an image, how far before and behind its middle the scene is in it.
-const LOOKED_AROUND: f64 = 2.0;
 
 /// Images of a surface that are kept at most: in a large scene others are made again.
 const MOST_IMAGES: usize = 2000;
@@ -54,11 +52,14 @@ pub(super) struct SceneSurface {
     /// Images of the whole scene, which all models share. Those of a fine surface take much memory, and few transforms are
     /// judged by each; they are not kept.
     images: Option<Mutex<SharedImages>>,
+    /// Made when the first image is.
+    lines_of_sight: OnceLock<LinesOfSight>,
 }
 
 impl SceneSurface {
     pub fn new(samples: &[SurfacePlace], voxel: f64, spacing: f64) -> Self {
-        Self { surface: OrientedSurface::new(samples), voxel, spacing, images: None }
+        let surface = OrientedSurface::new(samples);
+        Self { surface, voxel, spacing, images: None, lines_of_sight: OnceLock::new() }
     }
 
     fn keeping_images(self) -> Self {
@@ -87,22 +88,21 @@ impl SceneSurface {
         self.images.is_some()
     }
 
-    /// What the sensor saw around a point, about that point; free samples may confirm a model.
+    /// What the sensor saw around a point, about that point, with all that is before and behind it: a thing far before it
+    /// hides a model, and what is seen far behind it was seen through it. Free samples may confirm a model. There is one
+    /// viewpoint for all images.
     pub fn image(&self, middle: [f64; 3], reach: f64, viewpoint: [f64; 3], free: Free<'_>) -> DepthImage {
-        let center = middle.map(|x| x as f32);
+        let lines = self.lines_of_sight.get_or_init(|| LinesOfSight::new(self.samples(), viewpoint));
+        debug_assert_eq!(lines.viewpoint, viewpoint);
         let from = [0, 1, 2].map(|k| viewpoint[k] - middle[k]);
-        let distance = Vector3::from(from).norm();
-        let sight = (Vector3::from(from) / distance).map(|x| x as f32);
-        // The image is a square, and wider behind its middle.
-        let half_diagonal = SQRT_2 * reach * (1.0 + LOOKED_AROUND * reach / distance);
-        let widest = half_diagonal.powi(2) as f32;
         let (mut near, mut is_free) = (Vec::new(), Vec::new());
-        self.surface.each_within(middle, LOOKED_AROUND * reach, |number, sample| {
-            let place = [0, 1, 2].map(|k| sample.place[k] - center[k]);
-            if Vector3::from(place).cross(&sight).norm_squared() <= widest {
-                near.push(SurfacePlace { place, normal: sample.normal });
-                is_free.push(free.has(number as usize));
-            }
+        // The image is a square.
+        let half_diagonal = (SQRT_2 * reach).atan2(Vector3::from(from).norm());
+        lines.each_around(middle, half_diagonal, |number| {
+            let sample = &self.samples()[number as usize];
+            let place = [0, 1, 2].map(|k| (f64::from(sample.place[k]) - middle[k]) as f32);
+            near.push(SurfacePlace { place, normal: sample.normal });
+            is_free.push(free.has(number as usize));
         });
         DepthImage::new(&near, &is_free, from, self.voxel, reach, None)
     }

@@ -120,9 +120,8 @@ fn instances_depended_on_which_model_was_looked_for_first() {
     let is_shared = |places: &FieldPlaces| places.radius == sparse.places.radius;
     assert!(dense.larger_places.iter().any(is_shared) && dense.spacing < 0.6 * sparse.spacing);
     let scan = Scan::new(PointCloud::new_f64(&points)).seen_from(viewpoint);
-    let found = |models: [&Model; 2]| {
-        find_instances(&models, &scan, &FindSettings::default(), &monitor).unwrap()
-    };
+    let found =
+        |models: [&Model; 2]| find_instances(&models, &scan, &FindSettings::default(), &monitor).unwrap();
     let (one_way, mut other_way) = (found([&dense, &sparse]), found([&sparse, &dense]));
     assert_eq!(one_way.len(), 2);
     other_way.iter_mut().for_each(|instance| instance.model = 1 - instance.model);
@@ -250,6 +249,32 @@ fn free_space_speaks_against_what_is_not_there() {
         "{first:?} {supports:?}"
     );
     assert!(supports.iter().zip(&judged).all(|(cheap, full)| *cheap == full.support), "{supports:?}");
+}
+
+#[test]
+fn what_was_far_before_and_behind_a_model_was_not_looked_at() {
+    let (settings, viewpoint, voxel) = (FindSettings::default(), [0.0, 0.0, 50.0], 0.12);
+    let model = model_of(body(4000));
+    // A square across the line of sight, of the same extent for the sensor at any height.
+    let square = |height: f64| {
+        let wide = (50.0 - height) / 50.0 * 3.0;
+        let steps = (2.0 * wide / voxel) as i32;
+        let point = move |x: i32, y: i32| {
+            let [x, y] = [x, y].map(|step| voxel * f64::from(step) - wide);
+            ([x, y, height], Vector3::z())
+        };
+        model_of((0..=steps).flat_map(|x| (0..=steps).map(move |y| point(x, y))).collect())
+    };
+    let support_with = |square: Model| {
+        let surface = surface_of(&square, voxel);
+        let view = ModelView::new(&model, surface, Some(viewpoint), usize::MAX, &settings);
+        view.supports(&[RigidTransform::identity()])[0]
+    };
+    // Confirmed samples, less five times those that were seen through.
+    let behind = support_with(square(-30.0));
+    assert!(behind < -4.0, "a wall that is seen through the model: {behind}");
+    let before = support_with(square(15.0));
+    assert_eq!(before, 0.0, "a board that hides the model");
 }
 
 #[test]
