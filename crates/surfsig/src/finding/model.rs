@@ -116,7 +116,8 @@ impl Model {
             return Err(Error::InvalidModel(text.into()));
         }
         let noise = noise(&scan, voxel, monitor)?;
-        let places_of = |radius: f64| described(&scan, noise, radius, PLACES_OF_MODEL, monitor);
+        let positions: Vec<[f64; 3]> = samples.iter().map(|sample| sample.place.map(f64::from)).collect();
+        let places_of = |radius: f64| described(&scan, &positions, noise, radius, PLACES_OF_MODEL, monitor);
         let places = places_of(radius)?;
         Ok(Self {
             larger_places: LARGER
@@ -125,10 +126,10 @@ impl Model {
                 .collect::<Result<_, _>>()?,
             center: scan.center,
             spacing,
-            samples: samples.iter().map(|sample| sample.place.map(f64::from)).collect(),
             normals: samples.iter().map(|sample| sample.normal.map(f64::from)).collect(),
             places,
             is_sided,
+            samples: positions,
             points: scan.points,
         })
     }

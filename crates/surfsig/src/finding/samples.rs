@@ -20,7 +20,7 @@ const NORMAL_BALL: f64 = 3.0;
 /// Coefficients of the paraboloid in them.
 const UNKNOWNS: f64 = 6.0;
 /// Voxels along a patch's radius to which points are thinned before patches are described.
-const DESCRIPTION_VOXELS: f64 = 12.0;
+const DESCRIPTION_VOXELS: f64 = 16.0;
 /// Places with a signature along a patch's radius, in models.
 pub(super) const PLACES_OF_MODEL: f64 = 4.0;
 /// The same in scenes: each has a place of the model near it. With 2.5 there are nearly three times as many, and no more
@@ -73,18 +73,18 @@ pub(super) fn noise(scan: &CenteredScan, voxel: f64, monitor: &Monitor) -> Resul
     Ok(median((0..found.len()).filter_map(deviation).collect()).unwrap_or(0.0))
 }
 
-/// Places all over a scan with their signatures, but where its surface is flat: a patch of a plane is nowhere. `noise` is
-/// the scan's.
+/// Places all over a scan with their signatures, but where its surface is flat: a patch of a plane is nowhere. That is told
+/// by some of its points, so far apart that noise is small beside a voxel, and by the scan's noise.
 pub(super) fn described(
     scan: &CenteredScan,
+    some: &[[f64; 3]],
     noise: f64,
     radius: f64,
     places_per_radius: f64,
     monitor: &Monitor,
 ) -> Result<FieldPlaces, Error> {
-    let thinned = scan.thinned(radius / DESCRIPTION_VOXELS);
-    let cells = BentCells::new(&thinned.points, noise, radius);
-    let thinned = thinned.some(|point| cells.is_around(point));
+    let cells = BentCells::new(some, noise, radius);
+    let thinned = scan.thinned(radius / DESCRIPTION_VOXELS).some(|point| cells.is_around(point));
     let given = thinned.scan();
     let mut indices = voxel_representatives(&given.cloud, Radius::new(radius / places_per_radius)?)?;
     indices.retain(|&i| cells.is_bent(&thinned.points[i as usize]));

@@ -171,7 +171,12 @@ impl<'a> Scene<'a> {
 
     /// Distance between the samples in which a model is looked for.
     pub fn voxel(&mut self, model: &Model) -> Result<f64, Error> {
-        let voxel = model.voxel().max(model.spacing).max(self.settings.spacings_per_voxel * self.spacing);
+        self.resolved(model.voxel().max(model.spacing))
+    }
+
+    /// A distance between samples, or the least one at which they are on the surface, if that is more.
+    fn resolved(&mut self, voxel: f64) -> Result<f64, Error> {
+        let voxel = voxel.max(self.settings.spacings_per_voxel * self.spacing);
         Ok(voxel.max(self.settings.noises_per_voxel * self.noise(voxel)?))
     }
 
@@ -180,8 +185,10 @@ impl<'a> Scene<'a> {
         if let Some((_, known)) = self.places.iter().find(|(of, _)| *of == radius) {
             return Ok(Arc::clone(known));
         }
-        let noise = self.noise(radius / VOXELS_PER_RADIUS)?;
-        let places = Arc::new(described(&self.scan, noise, radius, PLACES_OF_SCENE, self.monitor)?);
+        let voxel = self.resolved(radius / VOXELS_PER_RADIUS)?;
+        let (some, noise) = (self.scan.thinned(voxel).points, self.noise(voxel)?);
+        let places = described(&self.scan, &some, noise, radius, PLACES_OF_SCENE, self.monitor)?;
+        let places = Arc::new(places);
         self.places.push((radius, Arc::clone(&places)));
         Ok(places)
     }
