@@ -23,7 +23,7 @@ MIRRORED: Solids = [
     *KINDS["bracket"],
     (simulate.Box((0.012, 0.010, 0.012)), simulate.pose((0.014, -0.008, -0.005))),
 ]
-AROUND = 0.04
+AROUND = 0.02
 """Of the table, in sight around the cells of the objects, in metres."""
 LEVEL = 2e-3
 """From the table to what an object stands on, for each one before it, in metres."""
