@@ -1,5 +1,6 @@
 """Models in a file."""
 
+import shutil
 import sqlite3
 from pathlib import Path
 from typing import Any
@@ -14,12 +15,18 @@ from surfsig import Library
 from surfsig.finding.library import stored_model
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    """A library with one model."""
-    path = tmp_path / "things.db"
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A library with one model, of which each test has a copy."""
+    path = tmp_path_factory.mktemp("library") / "things.db"
     Library(path).add("figure", whole("figure"), unit="m")
     return path
+
+
+@pytest.fixture
+def path(made: Path, tmp_path: Path) -> Path:
+    """A library with one model."""
+    return Path(shutil.copy(made, tmp_path / "things.db"))
 
 
 def test_what_is_added_comes_back(path: Path) -> None:

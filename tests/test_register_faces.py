@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from register_scenes import error
@@ -10,6 +12,8 @@ import surfsig
 from surfsig import PointCloud, simulate
 
 TRIPOD = simulate.Lidar(lines=64, elevation=(-50.0, 60.0), steps=480, noise=0.003, max_range=12.0)
+COARSE_TRIPOD = replace(TRIPOD, lines=32, steps=240)
+"""For many rooms: their faces are as plain from a quarter of the points."""
 PLACES = ((-3.2, 0.3, 0.5), (3.1, -0.4, 2.5))
 
 
@@ -45,7 +49,7 @@ def test_scans_of_four_rooms_get_one_set_of_poses() -> None:
     poses = [
         simulate.upright_pose(x + 0.2, y - 0.3, 1.5, 1.3 * number) for number, (x, y) in enumerate(places)
     ]
-    scans = [simulate.scan(scene, TRIPOD, pose, seed=number) for number, pose in enumerate(poses)]
+    scans = [simulate.scan(scene, COARSE_TRIPOD, pose, seed=number) for number, pose in enumerate(poses)]
     found = surfsig.register_multiway(scans)
     assert found.belongs.all(), found
     for number, pose in enumerate(poses):

@@ -83,16 +83,17 @@ def test_scans_that_do_not_belong_together_have_one_pose(scans: list[PointCloud]
 def test_the_shell_registers_several_files(
     shell: Callable[..., Any], scans: list[PointCloud], tmp_path: Path
 ) -> None:
-    files = [tmp_path / f"{number}.ply" for number in range(len(scans))]
-    for file, cloud in zip(files, scans, strict=True):
+    # One of the stranger, and two that belong together.
+    files = [tmp_path / f"{number}.ply" for number in range(3)]
+    for file, cloud in zip(files, scans[:3], strict=True):
         surfsig.write(file, cloud)
     poses, merged = tmp_path / "poses.json", tmp_path / "merged.ply"
     run = shell("register", *files, "-o", poses, "--merged", merged)
     assert (run.code, run.err) == (0, "")
-    assert "3 of 4 scans belong together" in run.out
+    assert "2 of 3 scans belong together" in run.out
     assert "does not belong" in run.out
-    assert len(json.loads(poses.read_text())["scans"]) == 4
-    assert len(surfsig.read(merged)) == sum(len(scans[number]) for number in (0, 2, 3))
+    assert len(json.loads(poses.read_text())["scans"]) == 3
+    assert len(surfsig.read(merged)) == sum(len(scans[number]) for number in (0, 2))
     for arguments, words in (
         ([files[0]], "at least two scans"),
         ([*files, "-o", tmp_path / "poses.ply"], ".json"),

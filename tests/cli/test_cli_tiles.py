@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +67,15 @@ def test_options_reach_the_tiles(
         )
 
 
-def test_errors_are_one_line(shell: Callable[..., Any], paths: list[Path], tmp_path: Path) -> None:
+def client_for_a_second(client: Callable[..., Any], address: str, timeout: str) -> Any:
+    """Connect to a scheduler for a second, not for as long as a user would wait."""
+    assert timeout == "20s"
+    return client(address, timeout="1s")
+
+
+def test_errors_are_one_line(
+    shell: Callable[..., Any], paths: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     out = tmp_path / "out"
     assert shell("extract", *paths, "--radius", RADIUS, "-o", out).code == 0
     for arguments, words in (
@@ -77,7 +86,9 @@ def test_errors_are_one_line(shell: Callable[..., Any], paths: list[Path], tmp_p
         (["--radius", RADIUS, "--scheduler", "tcp://127.0.0.1:9"], "no Dask scheduler answers"),
     ):
         if "--scheduler" in arguments:
-            pytest.importorskip("distributed")
+            distributed = pytest.importorskip("distributed")
+            impatient = partial(client_for_a_second, distributed.Client)
+            monkeypatch.setattr(distributed, "Client", impatient)
         finished = shell("extract", *paths, *arguments, "-o", out)
         assert finished.code == 2
         assert words in finished.err

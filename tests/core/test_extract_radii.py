@@ -121,8 +121,8 @@ def test_chosen_radii_are_powers_and_reported() -> None:
 @pytest.mark.slow
 def test_balls_stop_at_an_edge_and_at_the_other_side_of_a_plate() -> None:
     rng = np.random.default_rng(SEED)
-    xy = rng.uniform(-10, 10, (40_000, 2))
-    roof = np.column_stack([xy, -0.4 * abs(xy[:, 0]) + rng.normal(0, 0.02, 40_000)])
+    xy = rng.uniform(-10, 10, (20_000, 2))
+    roof = np.column_stack([xy, -0.4 * abs(xy[:, 0]) + rng.normal(0, 0.02, len(xy))])
     s = extract(roof, "auto")
     distance = abs(xy[:, 0])
     inner = (distance > 1) & (abs(xy) < 6).all(axis=1)
@@ -130,14 +130,14 @@ def test_balls_stop_at_an_edge_and_at_the_other_side_of_a_plate() -> None:
     radius = np.asarray(s.radius)
     assert (radius[inner] < 2 * distance[inner]).mean() > 0.98
     assert np.median(radius[inner]) > 0.4 * np.median(distance[inner])
-    plate = np.column_stack([xy, 1.0 * (rng.uniform(size=40_000) < 0.5) + rng.normal(0, 0.01, 40_000)])
+    plate = np.column_stack([xy, 1.0 * (rng.uniform(size=len(xy)) < 0.5) + rng.normal(0, 0.01, len(xy))])
     s = extract(plate, "auto")
     assert (np.asarray(s.radius) <= 1.001).mean() > 0.995
 
 
 @pytest.mark.slow
 def test_a_chosen_radius_does_not_depend_on_threads_scale_or_what_is_far_away() -> None:
-    points = bumps(30_000)
+    points = bumps(15_000)
     s = extract(points, "auto", threads=1)
     np.testing.assert_array_equal(s.k1, extract(points, "auto", threads=3).k1)
     twice = extract(4 * points, "auto")

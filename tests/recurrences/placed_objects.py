@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from recurrence_scene import KINDS, PITCH, SCANNER, TABLE_TILT
 from surface_points import Array
 
@@ -22,6 +23,8 @@ MIRRORED: Solids = [
     *KINDS["bracket"],
     (simulate.Box((0.012, 0.010, 0.012)), simulate.pose((0.014, -0.008, -0.005))),
 ]
+AROUND = 0.02
+"""Of the table, in sight around the cells of the objects, in metres."""
 LEVEL = 2e-3
 """From the table to what an object stands on, for each one before it, in metres."""
 
@@ -34,6 +37,12 @@ def enlarged(solids: Solids, scale: float) -> Solids:
         x, y, z = surface.size
         made.append((simulate.Box((scale * x, scale * y, scale * z)), simulate.pose(scale * pose[:3, 3])))
     return made
+
+
+def near_objects(cloud: surfsig.PointCloud, columns: int, rows: int) -> NDArray[np.bool_]:
+    """Tell which points are near the cells of the objects: the rest is table, and most of a scan."""
+    half = np.array([columns, rows]) * PITCH / 2 + AROUND
+    return np.asarray((np.abs(cloud.offsets[:, :2]) < half).all(axis=1))
 
 
 def scanned(
@@ -73,6 +82,7 @@ def scanned(
         placed += [simulate.Placed(surface, pose @ own, "object") for surface, own in solids]
         object_of_surface += [number] * len(solids)
     cloud = SCANNER.scan(simulate.Scene(placed), seed=[seed, 1])
+    cloud = cloud.at(near_objects(cloud, columns, rows))
     sheets, scan = np.unique(cloud.offsets[:, 1], return_inverse=True)
     cloud.fields["scan"] = scan.astype(np.int32)
     cloud.fields["object"] = np.array(object_of_surface)[cloud.fields["surface"]]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawn_shapes import sphere
+from placed_objects import near_objects
 from recurrence_scene import RecurrenceScene, recurrence_scene
 from recurrences import scored
 from surface_points import Array
@@ -17,8 +20,10 @@ KINDS = ("large ball", "small ball", "bracket", "egg")
 
 @pytest.fixture(scope="module")
 def scene() -> RecurrenceScene:
-    """Scan twelve objects of four kinds."""
-    return recurrence_scene(7, columns=4, rows=3, kinds=KINDS)
+    """Scan twelve objects of four kinds, and the table near them."""
+    scene = recurrence_scene(7, columns=4, rows=3, kinds=KINDS)
+    near = near_objects(scene.cloud, 4, 3)
+    return replace(scene, cloud=scene.cloud.at(near), object_of_point=scene.object_of_point[near])
 
 
 @pytest.fixture(scope="module")

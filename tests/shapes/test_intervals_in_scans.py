@@ -7,6 +7,7 @@ all directions. Before points at the border were left out, and standard errors k
 
 import math
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -47,6 +48,7 @@ def table_scan(
     return [points, on_object[np.linalg.norm(on_object - wanted, axis=1).argmin()]]
 
 
+@cache
 def share_held(fit: Callable[..., Surface], noise: float, rays: bool, count: int) -> float:
     rng = np.random.default_rng(81)
     held = []

@@ -233,7 +233,8 @@ def test_an_axis_that_is_known_is_kept(kind: str) -> None:
 @pytest.mark.parametrize("kind", ["circle", "line", "cone", "torus"])
 def test_errors_are_calibrated(kind: str) -> None:
     rng = np.random.default_rng(56)
-    found = [FITS[kind](revolved(rng, kind, SIZES[kind], 400, arc=4.0, noise=0.01)) for _ in range(150)]
+    # Of 100 draws the spread has an error of 7 %: the limits below are more than three of it away.
+    found = [FITS[kind](revolved(rng, kind, SIZES[kind], 400, arc=4.0, noise=0.01)) for _ in range(100)]
     if kind == "line":
         values, errors = [[s.axis[0] for s in found], [s.axis_std[0] for s in found]]
     elif kind == "cone":

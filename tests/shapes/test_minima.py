@@ -13,9 +13,9 @@ FITS = {"cylinder": fit_cylinder, "cone": fit_cone, "torus": fit_torus}
 SIZES = {"cylinder": (1.0,), "cone": (1.0, 0.4), "torus": (0.4, 1.0)}
 
 
-def share_wrong(kind: str, count: int, *, rings: bool) -> float:
+def share_wrong(kind: str, count: int, *, rings: bool, seed: int = 61) -> float:
     """Count fits of exact points of a shape, in any rotation and unit, that are another shape."""
-    rng = np.random.default_rng(61)
+    rng = np.random.default_rng(seed)
     wrong = 0
     for _ in range(count):
         number = int(np.exp(rng.uniform(math.log(10), math.log(400))))
@@ -43,4 +43,5 @@ def test_two_rings_lead_to_their_cylinder() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "rings", "most"), [("cylinder", True, 0), ("torus", False, 0.003)])
 def test_hardly_any_of_many_is_wrong(kind: str, rings: bool, most: float) -> None:
-    assert share_wrong(kind, 1200, rings=rings) <= most
+    # Others than those above. If 1 in 100 were wrong, a torus would pass once in 33 times.
+    assert share_wrong(kind, 700, rings=rings, seed=62) <= most

@@ -201,7 +201,7 @@ PAIRS: dict[str, Callable[[np.random.Generator], tuple[Surface, Surface]]] = {
 def test_standard_errors_are_those_of_many_draws(pair: str) -> None:
     rng = np.random.default_rng(6)
     draws: dict[str, list[tuple[float, float]]] = {}
-    for _ in range(150):
+    for _ in range(100):
         first, second = PAIRS[pair](rng)
         if pair != "tilted planes":
             found = first.distance_to(second)
@@ -216,5 +216,5 @@ def test_standard_errors_are_those_of_many_draws(pair: str) -> None:
     for name, values in draws.items():
         spread = np.std([value for value, _ in values])
         told = np.sqrt(np.mean([std**2 for _, std in values]))
-        # Of 150 draws the spread itself has an error of 6 %, and blocks of neighbours add theirs.
+        # Of 100 draws the spread itself has an error of 7 %, and blocks of neighbours add theirs.
         assert told == pytest.approx(spread, rel=0.25), name

@@ -1,22 +1,47 @@
 """Surfaces of real scans, found by one call without parameters."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from segmentation_score import Found, TableScore, score_table
-from segmentation_truth import read_tables
+from segmentation_truth import TableScene, read_tables
 
 import surfsig
-from surfsig import Surface
+from surfsig import Surface, Surfaces
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*the last line .* is cut off:UserWarning")
 
 
+@cache
+def surfaces_of(path: Path) -> Surfaces:
+    """Find the surfaces of a file, once for all tests."""
+    return surfsig.find_surfaces(surfsig.read(path))
+
+
+WHOLE = "learn33"
+"""The scan of a table with two cans, which is looked at as it is."""
+
+
+def thinned(scene: TableScene) -> TableScene:
+    """Keep every other row and column, as of a camera with half as many."""
+    kept = np.zeros((480, 640), bool)
+    kept[::2, ::2] = True
+    return TableScene(scene.name, scene.cloud.at(kept.ravel()), scene.objects[kept.ravel()])
+
+
+@pytest.fixture(scope="module")
+def tables(shared_data: Path) -> list[tuple[TableScene, Surfaces]]:
+    """The labelled scans of tables, all but one thinned, and the surfaces that are found in each."""
+    scenes = [scene if scene.name == WHOLE else thinned(scene) for scene in read_tables(shared_data)]
+    return [(scene, surfsig.find_surfaces(scene.cloud)) for scene in scenes]
+
+
 def found_in(path: Path, kind: str, near: float) -> Surface:
     """Give the surface of a kind whose radius is nearest to what is expected."""
-    candidates = [surface for surface in surfsig.find_surfaces(surfsig.read(path)) if surface.kind == kind]
+    candidates = [surface for surface in surfaces_of(path) if surface.kind == kind]
     assert candidates
     return min(candidates, key=lambda surface: abs(surface.radius - near))
 
@@ -24,7 +49,7 @@ def found_in(path: Path, kind: str, near: float) -> Surface:
 @pytest.mark.slow
 def test_the_mug(shared_data: Path) -> None:
     """PCL fits 0.0396 to it; towards its foot the camera rounds it off, and it has a handle."""
-    found = surfsig.find_surfaces(surfsig.read(shared_data / "surfaces" / "table_scene_mug.pcd"))
+    found = surfaces_of(shared_data / "surfaces" / "table_scene_mug.pcd")
     # The largest one is its outside; its inside is another.
     mug = max((each for each in found if each.kind == "cylinder"), key=lambda each: each.count)
     assert mug.radius == pytest.approx(0.0396, abs=0.0025)
@@ -61,8 +86,8 @@ def test_the_gym_ball(shared_data: Path) -> None:
 
 def test_the_gym_ball_is_found_wherever_it_lies(shared_data: Path) -> None:
     """Which points of its clumps were looked at depended on where it lay: moved, it was three cylinders."""
-    points = surfsig.read(shared_data / "surfaces" / "gym_ball.xyz").points.astype(np.float64)
-    there, moved = surfsig.find_surfaces(points), surfsig.find_surfaces(points + np.array([1.0, 2.0, 3.0]))
+    there = surfaces_of(shared_data / "surfaces" / "gym_ball.xyz")
+    moved = surfsig.find_surfaces(there.cloud.points + np.array([1.0, 2.0, 3.0]))
     assert [each.kind for each in moved] == [each.kind for each in there]
     assert [each.count for each in moved] == pytest.approx([each.count for each in there], abs=20)
 
@@ -81,24 +106,21 @@ def test_the_gym_ball_is_found_however_it_is_rotated(shared_data: Path) -> None:
 
 
 @pytest.mark.slow
-def test_tables_are_not_mixed_nor_in_pieces(shared_data: Path) -> None:
-    scenes = read_tables(shared_data)
-    found = [surfsig.find_surfaces(scene.cloud) for scene in scenes]
+def test_tables_are_not_mixed_nor_in_pieces(tables: list[tuple[TableScene, Surfaces]]) -> None:
     total = TableScore.total(
         score_table(
             scene, Found(each.labels.astype(np.int64), [s.kind for s in each], [s.radius for s in each])
         )
-        for scene, each in zip(scenes, found, strict=True)
+        for scene, each in tables
     )
     assert total.unmixed / total.labelled > 0.97
     assert total.segments / total.objects < 3
 
 
 @pytest.mark.slow
-def test_equal_cans_have_equal_radii(shared_data: Path) -> None:
+def test_equal_cans_have_equal_radii(tables: list[tuple[TableScene, Surfaces]]) -> None:
     """Two cans stand on one of the tables; nobody says how large they are, but they are of one size."""
-    scene = next(each for each in read_tables(shared_data) if each.name == "learn33")
-    found = surfsig.find_surfaces(scene.cloud)
+    scene, found = next(each for each in tables if each[0].name == WHOLE)
     cans = []
     for number in (5, 6):
         labels = found.labels[scene.objects == number]
@@ -112,7 +134,7 @@ def test_equal_cans_have_equal_radii(shared_data: Path) -> None:
 @pytest.mark.slow
 def test_what_may_be_a_plane_is_no_sphere(shared_data: Path) -> None:
     """Part of the clutter behind the mug was a sphere of radius 0.17 +- 0.15."""
-    found = surfsig.find_surfaces(surfsig.read(shared_data / "surfaces" / "table_scene_mug.pcd"))
+    found = surfaces_of(shared_data / "surfaces" / "table_scene_mug.pcd")
     round_ones = [each for each in found if each.kind in ("sphere", "cylinder")]
     assert round_ones
     determined = [each for each in round_ones if each.radius_determined]

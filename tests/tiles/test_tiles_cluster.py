@@ -6,6 +6,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -32,16 +33,24 @@ def expected(paths: list[Path], tmp_path_factory: pytest.TempPathFactory) -> dic
     return hashes(out)
 
 
-@pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[Any]:
+@contextmanager
+def two_workers(folder: Path) -> Iterator[Any]:
+    """Start a cluster of two processes, which takes each some seconds."""
     with distributed.LocalCluster(
         n_workers=2,
         threads_per_worker=1,
         processes=True,
         memory_limit="1500MB",
         dashboard_address=None,
-        local_directory=str(tmp_path / "dask"),
+        local_directory=str(folder),
     ) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A cluster for all tests that leave its workers as they are."""
+    with two_workers(tmp_path_factory.mktemp("dask")) as found:
         yield found
 
 
@@ -58,13 +67,13 @@ def test_an_address_gives_the_same_parts(
 
 
 def test_workers_that_are_killed_cost_nothing(
-    paths: list[Path], expected: dict[int, str], cluster: Any, tmp_path: Path
+    paths: list[Path], expected: dict[int, str], tmp_path: Path
 ) -> None:
     killed: list[int] = []
     out = tmp_path / "out"
     finished = threading.Event()
 
-    def kill() -> None:
+    def kill(cluster: Any) -> None:
         seen: set[int] = set()
         while len(killed) < 3 and not finished.is_set():
             pids = [worker.pid for worker in cluster.workers.values() if worker.pid not in seen]
@@ -74,14 +83,15 @@ def test_workers_that_are_killed_cost_nothing(
                 killed.append(pids[0])
             time.sleep(0.05)
 
-    thread = threading.Thread(target=kill)
-    thread.start()
-    try:
-        with distributed.Client(cluster) as client:
-            surfsig.extract_tiles(paths, out, RADIUS, tiles=24, client=client)
-    finally:
-        finished.set()
-        thread.join()
+    with two_workers(tmp_path / "dask") as mortal:
+        thread = threading.Thread(target=kill, args=[mortal])
+        thread.start()
+        try:
+            with distributed.Client(mortal) as client:
+                surfsig.extract_tiles(paths, out, RADIUS, tiles=24, client=client)
+        finally:
+            finished.set()
+            thread.join()
     assert killed
     assert hashes(out) == expected
     assert not list(out.glob("*.tmp"))

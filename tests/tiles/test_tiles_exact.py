@@ -157,10 +157,10 @@ def test_few_points_and_clouds_of_one_place(tmp_path: Path) -> None:
 @pytest.mark.parametrize("seed", [101])
 def test_dense_and_sparse_places(tmp_path: Path, seed: int) -> None:
     """Points as a standing scanner measures them: ten thousand times as dense near to it."""
-    rng = np.random.default_rng(seed)
-    distance, angle = np.exp(rng.uniform(np.log(0.3), np.log(30), 40_000)), rng.uniform(0, 2 * np.pi, 40_000)
+    rng, count = np.random.default_rng(seed), 10_000
+    distance, angle = np.exp(rng.uniform(np.log(0.3), np.log(30), count)), rng.uniform(0, 2 * np.pi, count)
     x, y = distance * np.cos(angle), distance * np.sin(angle)
-    z = 0.2 * np.sin(x) + 0.1 * np.cos(1.7 * y) + rng.normal(0, 0.003, 40_000)
+    z = 0.2 * np.sin(x) + 0.1 * np.cos(1.7 * y) + rng.normal(0, 0.003, count)
     points = np.column_stack([x, y, z]).astype(np.float32)
     surfsig.write(tmp_path / "in.ply", PointCloud(points, viewpoint=np.array([0.0, 0, 2])))
     whole = surfsig.read(tmp_path / "in.ply")

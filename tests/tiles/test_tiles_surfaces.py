@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from conftest import Finished
 from numpy.typing import NDArray
 from surface_tile_scenes import LENGTH, NOISE, ORIGIN, RADIUS, pipe, plant, plant_files
 from tile_scenes import in_order
@@ -276,13 +276,11 @@ def test_a_file_that_cannot_be_read_costs_its_tiles_only(tmp_path: Path) -> None
     assert max(surface.length for surface in found) > 35
 
 
-def test_the_command_line(paths: list[Path], tmp_path: Path) -> None:
-    command: list[str | Path] = [sys.executable, "-m", "surfsig.cli", "surfaces", *paths]
+def test_the_command_line(shell: Callable[..., Finished], paths: list[Path], tmp_path: Path) -> None:
     out = tmp_path / "out"
-    more: list[str | Path] = ["--tiles", "3", "--csv", tmp_path / "t.csv"]
-    done = subprocess.run([*command, "-o", out, *more], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "5 surfaces: 3 planes, 2 cylinders" in done.stdout
+    done = shell("surfaces", *paths, "-o", out, "--tiles", 3, "--csv", tmp_path / "t.csv")
+    assert done.code == 0, done.err
+    assert "5 surfaces: 3 planes, 2 cylinders" in done.out
     assert len((tmp_path / "t.csv").read_text().splitlines()) == 6
     assert (out / "tile_000002.laz").exists()
     for wrong, why in (
@@ -290,7 +288,6 @@ def test_the_command_line(paths: list[Path], tmp_path: Path) -> None:
         (["--tiles", "3"], "--tiles needs a folder"),
         (["-o", tmp_path / "one.ply", "--restart"], "--restart needs a folder"),
     ):
-        asked: list[str | Path] = [*command, *wrong]
-        refused = subprocess.run(asked, capture_output=True, text=True, check=False)
-        assert refused.returncode == 2
-        assert why in refused.stderr
+        refused = shell("surfaces", *paths, *wrong)
+        assert refused.code == 2
+        assert why in refused.err
