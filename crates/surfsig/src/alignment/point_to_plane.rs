@@ -165,8 +165,9 @@ mod tests {
 
     #[test]
     fn the_nearest_point_is_that_of_a_search_through_all() {
-        let points = box_points();
-        let surface = OrientedSurface::new(&points);
+        let surface = OrientedSurface::new(&box_points());
+        // In the order of the tree.
+        let points = surface.points();
         for (number, point) in points.iter().enumerate() {
             let asked = SurfacePlace { place: point.place.map(|x| 1.1 * x + 0.3), ..*point };
             let square = |other: &SurfacePlace| {
