@@ -113,6 +113,9 @@ impl<'a> ModelView<'a> {
         most: usize,
         settings: &'a FindSettings,
     ) -> Self {
+        if let Some(viewpoint) = viewpoint {
+            scene.see_from(viewpoint);
+        }
         let chosen = some_of(model.samples.len(), most);
         let points: Vec<[f64; 3]> = chosen.iter().map(|&i| model.samples[i]).collect();
         // In the order of a tree's leaves, searches one after the other find their part of another tree in the cache.
@@ -227,7 +230,7 @@ impl<'a> ModelView<'a> {
         }
         let of_cell = |(cell, numbers): (&[i64; 3], &Vec<usize>)| {
             let middle = cell.map(|x| x as f64 * edge);
-            let made = || self.scene.image(middle, reach + HALF_DIAGONAL * edge, viewpoint, free);
+            let made = || self.scene.image(middle, reach + HALF_DIAGONAL * edge, free);
             let shared = is_shared.then(|| self.scene.shared_image(step, *cell)).flatten();
             let image = shared.unwrap_or_default();
             let image = image.get_or_init(made);

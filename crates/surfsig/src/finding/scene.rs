@@ -52,7 +52,7 @@ pub(super) struct SceneSurface {
     /// Images of the whole scene, which all models share. Those of a fine surface take much memory, and few transforms are
     /// judged by each; they are not kept.
     images: Option<Mutex<SharedImages>>,
-    /// Made when the first image is.
+    /// See [`SceneSurface::see_from`].
     lines_of_sight: OnceLock<LinesOfSight>,
 }
 
@@ -88,13 +88,20 @@ impl SceneSurface {
         self.images.is_some()
     }
 
+    /// Sorts the samples by their direction from the viewpoint, the same one for all images, before the first image is made.
+    /// A thread that did so while it makes one of many images would take over another image meanwhile, and wait for itself.
+    pub fn see_from(&self, viewpoint: [f64; 3]) {
+        self.lines_of_sight.get_or_init(|| LinesOfSight::new(self.samples(), viewpoint));
+    }
+
     /// What the sensor saw around a point, about that point, with all that is before and behind it: a thing far before it
-    /// hides a model, and what is seen far behind it was seen through it. Free samples may confirm a model. There is one
-    /// viewpoint for all images.
-    pub fn image(&self, middle: [f64; 3], reach: f64, viewpoint: [f64; 3], free: Free<'_>) -> DepthImage {
-        let lines = self.lines_of_sight.get_or_init(|| LinesOfSight::new(self.samples(), viewpoint));
-        debug_assert_eq!(lines.viewpoint, viewpoint);
-        let from = [0, 1, 2].map(|k| viewpoint[k] - middle[k]);
+    /// hides a model, and what is seen far behind it was seen through it. Free samples may confirm a model.
+    ///
+    /// # Panics
+    /// If it was not told from where the surface was seen.
+    pub fn image(&self, middle: [f64; 3], reach: f64, free: Free<'_>) -> DepthImage {
+        let lines = self.lines_of_sight.get().expect("a surface that was seen from somewhere");
+        let from = [0, 1, 2].map(|k| lines.viewpoint[k] - middle[k]);
         let (mut near, mut is_free) = (Vec::new(), Vec::new());
         // The image is a square.
         let half_diagonal = (SQRT_2 * reach).atan2(Vector3::from(from).norm());

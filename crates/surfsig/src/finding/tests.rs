@@ -278,6 +278,31 @@ fn what_was_far_before_and_behind_a_model_was_not_looked_at() {
 }
 
 #[test]
+fn a_thread_waited_for_itself_while_the_first_images_were_made() {
+    let (settings, viewpoint, voxel) = (FindSettings::default(), [0.0, 0.0, 50.0], 0.03);
+    // So many samples that they are sorted by several threads, and images of many cells.
+    let surface = || surface_of(&model_of(body(60_000)), voxel);
+    let model = model_of(body(300));
+    let transforms: Vec<RigidTransform> = (0..64)
+        .map(|i| {
+            let shift = [f64::from(i % 8), f64::from(i / 8), 0.0];
+            RigidTransform::from_rotation_vector([0.0; 3], shift)
+        })
+        .collect();
+    let supports = |threads| {
+        with_threads(Some(threads), || {
+            let view = ModelView::new(&model, surface(), Some(viewpoint), usize::MAX, &settings);
+            view.supports(&transforms)
+        })
+        .unwrap()
+    };
+    let alone = supports(1);
+    for _ in 0..10 {
+        assert_eq!(supports(4), alone);
+    }
+}
+
+#[test]
 fn a_coarse_surface_was_taken_for_a_fine_one_of_the_same_voxel() {
     let (settings, monitor) = (FindSettings::default(), Monitor::default());
     let viewpoint = [0.5, -3.0, 14.0];
