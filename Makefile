@@ -14,7 +14,7 @@ SOURCES := $(shell find crates/surfsig crates/surfsig-python -name '*.rs' -o -na
 # The page's tools, from npm; nothing where node is missing.
 NODE := $(shell command -v node 2>/dev/null)
 
-.PHONY: page test-web bench-page help demo test test-all lint format bench bench-reading bench-error bench-segmentation bench-intervals bench-registration bench-finding bench-odometry bench-trust bench-covariance bench-multiway fuzz docs tour wheel check-wheel header install-c clean build bench-scale
+.PHONY: page test-web bench-page help demo test test-all test-rust test-python lint format bench bench-reading bench-error bench-segmentation bench-intervals bench-registration bench-finding bench-odometry bench-trust bench-covariance bench-multiway fuzz docs tour wheel check-wheel header install-c clean build bench-scale
 .DEFAULT_GOAL := help
 
 help: ## Say what there is to make
@@ -24,26 +24,31 @@ demo: build ## Run the main job and draw it into demo/
 	$(BIN)/python examples/demo.py $(OUT)
 	$(BIN)/surfsig paper --out $(OUT)/paper
 
-test: build ## Run the quick tests: Rust, its doc examples, Python without the slow ones
-	cargo test --release --workspace --quiet
+test: build test-rust ## Run the quick tests: Rust, its doc examples, Python without the slow ones
 	$(BIN)/python -m pytest
 
-test-all: build ## Run all tests, the slow ones too
+test-all: test-rust test-python ## Run all tests, the slow ones too
+
+test-rust: ## Run the tests of Rust, and its doc examples
 	cargo test --release --workspace --quiet
+
+test-python: build ## Run all tests of Python, the slow ones too
 	$(BIN)/python -m pytest -m ""
 
-lint: build ## Formatters, linters and type checkers
+lint: $(VENV)/.tools ## Formatters, linters and type checkers
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/mypy
-	$(BIN)/python -m mypy.stubtest surfsig._surfsig
 ifdef NODE
 	$(MAKE) web/node_modules/.built
 	cd web && npm run --silent check
 endif
+# These need the compiled module and what it depends on. They come last: Rust's tests may hold the compiler until here.
+	$(MAKE) build
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest surfsig._surfsig
 
 page: web/node_modules/.built ## Build the page: the core in WebAssembly, and the viewer of all reports
 	cd web && node build_engine.mjs && node build.mjs
