@@ -35,20 +35,18 @@ test-rust: ## Run the tests of Rust, and its doc examples
 test-python: build ## Run all tests of Python, the slow ones too
 	$(BIN)/python -m pytest -m ""
 
-lint: $(VENV)/.tools ## Formatters, linters and type checkers
+lint: build ## Formatters, linters and type checkers
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest surfsig._surfsig
 ifdef NODE
 	$(MAKE) web/node_modules/.built
 	cd web && npm run --silent check
 endif
-# These need the compiled module and what it depends on. They come last: Rust's tests may hold the compiler until here.
-	$(MAKE) build
-	$(BIN)/mypy
-	$(BIN)/python -m mypy.stubtest surfsig._surfsig
 
 page: web/node_modules/.built ## Build the page: the core in WebAssembly, and the viewer of all reports
 	cd web && node build_engine.mjs && node build.mjs
