@@ -220,14 +220,16 @@ pub(super) fn refined<'a>(
     // The model's surface is the target: it is whole, and denser than what is seen.
     let surface = candidate.sought.surface();
     let start = candidate.T_scene_model.inverse();
-    let fit = surface.align(&sample, start, &settings.point_to_surface)?;
-    let fitted =
-        Candidate { T_scene_model: fit.T_target_source.inverse(), is_fitted: true, ..candidate.clone() };
-    let evidence = fitted.judged(free);
-    if evidence.log_odds >= candidate.evidence.log_odds - GAIN_OF_FIT {
-        return Some((Refined { candidate: fitted, fit, sample }, evidence));
+    if let Some(fit) = surface.align(&sample, start, &settings.point_to_surface) {
+        let fitted =
+            Candidate { T_scene_model: fit.T_target_source.inverse(), is_fitted: true, ..candidate.clone() };
+        let evidence = fitted.judged(free);
+        if evidence.log_odds >= candidate.evidence.log_odds - GAIN_OF_FIT {
+            return Some((Refined { candidate: fitted, fit, sample }, evidence));
+        }
     }
-    // Where the points hardly determine a motion, the fit has followed their noise and left the place that was judged.
+    // Where the points hardly determine a motion, the fit has followed their noise and left the place that was judged, or
+    // even the surface.
     let there = PointToSurfaceSettings { max_iterations: 0, ..settings.point_to_surface };
     let fit = surface.align(&sample, start, &there)?;
     let stays = Candidate { is_fitted: true, ..candidate.clone() };
