@@ -581,9 +581,9 @@ class FindSettings:
         *,
         similar: int | None = None,
         few_points: int | None = None,
-        rough_kept: int | None = None,
-        rough_points: int | None = None,
         rough_voxel: float | None = None,
+        agreed: int | None = None,
+        agreed_within: Sequence[float] | None = None,
         proposals: int | None = None,
         first_points: int | None = None,
         first_distances: tuple[float, float, int] | None = None,
@@ -616,14 +616,14 @@ class FindSettings:
     def few_points(self) -> int:
         """Points of the model by which all transforms that matches propose are judged, without alignment."""
     @property
-    def rough_kept(self) -> int:
-        """Of these transforms, how many are judged by more points."""
-    @property
-    def rough_points(self) -> int:
-        """Those points."""
-    @property
     def rough_voxel(self) -> float:
         """Voxels of that judgement in the model's extent."""
+    @property
+    def agreed(self) -> int:
+        """Of these transforms, how many are aligned: those that most others agree with."""
+    @property
+    def agreed_within(self) -> list[float]:
+        """Of the model's extent, and radians, within which two of them agree."""
     @property
     def proposals(self) -> int:
         """Proposed transforms that are judged by few points."""

@@ -18,12 +18,12 @@ settings_class! {
         similar: usize = similar,
         /// Points of the model by which all transforms that matches propose are judged, without alignment.
         few_points: usize = few_points,
-        /// Of these transforms, how many are judged by more points.
-        rough_kept: usize = rough_kept,
-        /// Those points.
-        rough_points: usize = rough_points,
         /// Voxels of that judgement in the model's extent.
         rough_voxel: f64 = rough_voxel,
+        /// Of these transforms, how many are aligned: those that most others agree with.
+        agreed: usize = agreed,
+        /// Of the model's extent, and radians, within which two of them agree.
+        agreed_within: [f64; 2] = agreed_within,
         /// Proposed transforms that are judged by few points.
         proposals: usize = proposals,
         /// Points of the model in that first judgement.

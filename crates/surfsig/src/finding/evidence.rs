@@ -186,7 +186,7 @@ impl<'a> ModelView<'a> {
             let facing = facing as f64 / self.samples.len().max(1) as f64;
             let confirmed = f64::from(judgement.confirmed);
             let visible = confirmed / facing.max(confirmed).max(1e-9);
-            let is_looked_at = !self.front.is_empty() && self.support(&judgement) > 0.0;
+            let is_looked_at = !self.front.is_empty() && self.is_possible(&judgement);
             let front = is_looked_at.then(|| self.front(image, local));
             self.weighed(transform, Some(&Seen { judgement, visible, cosines, front }), free)
         })
@@ -202,6 +202,15 @@ impl<'a> ModelView<'a> {
         self.in_images(transforms, Free::All, |image, local, _, _| {
             self.support(&image.judge(local, &self.samples, self.scene.voxel as f32))
         })
+    }
+
+    /// Whether a transform is worth a look. Few samples must support it. Where the front is judged, too, that tells better
+    /// what was seen through: sensors lose steep rims, so that up to a sixth of a true instance's samples seem to be.
+    fn is_possible(&self, judgement: &Judgement) -> bool {
+        if self.front.is_empty() {
+            return self.support(judgement) > 0.0;
+        }
+        judgement.confirmed > judgement.contradicted + judgement.missing
     }
 
     fn support(&self, judgement: &Judgement) -> f64 {
@@ -250,9 +259,8 @@ impl<'a> ModelView<'a> {
     /// The evidence, by what depth images say where it is known from where all was seen.
     fn weighed(&self, transform: &RigidTransform, seen: Option<&Seen>, free: Free<'_>) -> Evidence {
         if let Some(seen) = seen {
-            let support = self.support(&seen.judgement);
-            if support <= 0.0 {
-                return Evidence::none(support, seen.visible, 0.0);
+            if !self.is_possible(&seen.judgement) {
+                return Evidence::none(self.support(&seen.judgement), seen.visible, 0.0);
             }
         }
         let moved: Vec<SurfacePlace> =
@@ -274,7 +282,7 @@ impl<'a> ModelView<'a> {
                 (self.settings.unknown_free_space_weight * touching / self.most_seen, touching, unknown)
             }
         };
-        if support <= 0.0 || touching <= 0.0 {
+        if touching <= 0.0 {
             return Evidence::none(support, visible, overlap);
         }
         let on = || (0..moved.len()).filter(|&sample| is_touching[sample]);

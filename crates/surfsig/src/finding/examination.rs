@@ -59,7 +59,7 @@ impl Refined<'_> {
         // What the sensor saw through or did not see refutes a rival, too.
         let is_as_good = |transform: &RigidTransform| {
             let rival = Candidate { T_scene_model: *transform, ..self.candidate.clone() };
-            rival.judged(free).support >= (1.0 - settings.rival_deficit) * support
+            rival.judged(free).support >= support - settings.rival_deficit * support.abs()
         };
         let alternatives: Vec<RigidTransform> = rivals
             .as_good_as_the_best(&best, &proposed, |_| settings.rivals.deficit)

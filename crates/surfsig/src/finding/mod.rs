@@ -29,9 +29,9 @@ use crate::geometry::RigidTransform;
 use crate::scan::CenteredScan;
 use crate::{Error, FieldPlaces, Monitor, Scan, with_threads};
 use acceptance::{Candidate, Sought, accepted, least_before_fit};
-use evidence::ModelView;
+use evidence::{Evidence, ModelView};
 use model::{MIN_POINTS, SPACINGS_PER_RADIUS, on_ladder};
-use proposals::{different, proposed_transforms, raw_transforms};
+use proposals::{different, most_agreed, proposed_transforms, raw_transforms};
 use rival_candidates::rival_log_odds;
 use scene::{Free, Scene};
 use std::sync::Arc;
@@ -134,8 +134,8 @@ fn candidates_of<'a>(
             let pairs = side.all_places().zip(&places);
             let raw: Vec<RigidTransform> =
                 pairs.flat_map(|(own, seen)| raw_transforms(own, seen, settings.similar)).collect();
-            let few = view(&rough, settings.few_points);
-            supported(&few, &view(&rough, settings.rough_points), &raw, settings)
+            let supported = supported(&view(&rough, settings.few_points), &raw);
+            most_agreed(&supported, side.extent(), settings)
         } else {
             proposed_transforms(&side.places, &places[0], settings)
         };
@@ -178,39 +178,31 @@ fn log_odds(probability: f64) -> f64 {
     (probability / (1.0 - probability)).ln()
 }
 
-/// The transforms that what the sensor saw supports most, each different from the others. Few points of the model choose
-/// those that more judge.
-fn supported(
-    few: &ModelView<'_>,
-    view: &ModelView<'_>,
-    transforms: &[RigidTransform],
-    settings: &FindSettings,
-) -> Vec<RigidTransform> {
-    let mut some = most_supported(few, transforms);
-    some.truncate(settings.rough_kept);
-    let [distance, angle] = [settings.rough_same[0] * view.reach, settings.rough_same[1]];
-    different(most_supported(view, &some).into_iter(), settings.proposals, distance, angle)
-}
-
-/// Transforms that anything supports, the most supported first.
-fn most_supported(view: &ModelView<'_>, transforms: &[RigidTransform]) -> Vec<RigidTransform> {
+/// The transforms that what the sensor saw speaks for.
+fn supported(view: &ModelView<'_>, transforms: &[RigidTransform]) -> Vec<RigidTransform> {
     let supports = view.supports(transforms);
-    let mut order: Vec<usize> = (0..transforms.len()).filter(|&i| supports[i] > 0.0).collect();
-    order.sort_by(|&a, &b| supports[b].total_cmp(&supports[a]));
-    order.into_iter().map(|i| transforms[i]).collect()
+    transforms.iter().zip(supports).filter(|(_, support)| *support > 0.0).map(|(one, _)| *one).collect()
 }
 
-/// Transforms, aligned by the samples of a view, that anything speaks for; the best first.
+/// Transforms that anything speaks for, aligned by the samples of a view where that is better; the best first.
 fn best_first(
     view: &ModelView<'_>,
     transforms: &[RigidTransform],
     distances: (f64, f64, usize),
 ) -> impl Iterator<Item = RigidTransform> + use<> {
+    let judged = |transforms: &[RigidTransform]| view.judged(transforms, Free::All);
     let aligned = view.aligned(transforms, distances, usize::MAX);
-    let judged = view.judged(&aligned, Free::All);
-    let mut order: Vec<usize> = (0..aligned.len()).filter(|&i| judged[i].support > 0.0).collect();
-    order.sort_by(|&a, &b| judged[b].log_odds.total_cmp(&judged[a].log_odds));
-    order.into_iter().map(move |i| aligned[i])
+    let mut all: Vec<(RigidTransform, Evidence)> =
+        transforms.iter().copied().zip(judged(transforms)).collect();
+    for (best, after) in all.iter_mut().zip(aligned.iter().copied().zip(judged(&aligned))) {
+        // Of a coarse surface, some of it smoothed by the sensor, an alignment may slide away.
+        if after.1.log_odds >= best.1.log_odds {
+            *best = after;
+        }
+    }
+    all.retain(|(_, evidence)| evidence.support > 0.0);
+    all.sort_by(|(_, a), (_, b)| b.log_odds.total_cmp(&a.log_odds));
+    all.into_iter().map(|(transform, _)| transform)
 }
 
 #[cfg(test)]

@@ -141,6 +141,17 @@ pub(super) fn raw_transforms(model: &FieldPlaces, scene: &FieldPlaces, count: us
     similar_places(scene, model, count).par_iter().map(|one| one.T_target_source.inverse()).collect()
 }
 
+/// The transforms that most others agree with, by the model's extent; each counts the same.
+pub(super) fn most_agreed(
+    transforms: &[RigidTransform],
+    extent: f64,
+    settings: &FindSettings,
+) -> Vec<RigidTransform> {
+    let [distance, angle] = settings.agreed_within;
+    let proposals = Proposals::new(transforms, vec![1.0; transforms.len()], distance * extent, angle);
+    proposals.most_agreed(settings.agreed, settings.merged_share)
+}
+
 /// The transforms that are not the same as an earlier one, `most` of them at most.
 pub(super) fn different(
     transforms: impl Iterator<Item = RigidTransform>,
@@ -222,6 +233,30 @@ mod tests {
             let off = (RigidTransform::exp(twist).inverse() * *found).log();
             assert!(off.iter().all(|x| x.abs() < 0.01), "{off:?}");
         }
+    }
+
+    #[test]
+    fn of_many_transforms_those_that_others_agree_with_come_first() {
+        let settings = FindSettings { agreed: 3, ..Default::default() };
+        let [distance, angle] = settings.agreed_within;
+        let extent = 0.5;
+        let truth = RigidTransform::exp([0.4, -1.0, 0.7, 0.2, 0.1, 0.9]);
+        // All over the place, but for eight within a third of what agrees.
+        let anywhere = |i: usize| RigidTransform::exp(std::array::from_fn(|k| 3.0 * number(i * 6 + k)));
+        let near = |i: usize| {
+            let of = |k: usize| number(5000 + i * 6 + k) / 5.0;
+            let turned = RigidTransform::from_rotation_vector([0, 1, 2].map(|k| angle * of(k)), [0.0; 3]);
+            let shift = Vector3::from([3, 4, 5].map(|k| distance * extent * of(k)));
+            let rotation = turned.rotation * truth.rotation;
+            RigidTransform { rotation, translation: truth.translation + shift }
+        };
+        let mut all: Vec<RigidTransform> = (0..400).map(anywhere).collect();
+        (0..8).for_each(|i| all.insert(50 * i, near(i)));
+        let found = most_agreed(&all, extent, &settings);
+        assert_eq!(found.len(), 3);
+        let gap = (found[0].translation - truth.translation).norm();
+        let turn = (truth.inverse() * found[0]).log()[..3].iter().map(|x| x * x).sum::<f64>().sqrt();
+        assert!(gap < 0.2 * distance * extent && turn < 0.2 * angle, "{gap} {turn}");
     }
 
     #[test]
