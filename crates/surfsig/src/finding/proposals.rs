@@ -141,7 +141,8 @@ pub(super) fn raw_transforms(model: &FieldPlaces, scene: &FieldPlaces, count: us
     similar_places(scene, model, count).par_iter().map(|one| one.T_target_source.inverse()).collect()
 }
 
-/// The transforms that most others agree with, by the model's extent; each counts the same.
+/// The transforms that most others agree with, by the model's extent; each counts the same. Of those that agree with one
+/// another only one is given, so that a turn about an axis that hardly shows is tried at many angles.
 pub(super) fn most_agreed(
     transforms: &[RigidTransform],
     extent: f64,
@@ -149,7 +150,7 @@ pub(super) fn most_agreed(
 ) -> Vec<RigidTransform> {
     let [distance, angle] = settings.agreed_within;
     let proposals = Proposals::new(transforms, vec![1.0; transforms.len()], distance * extent, angle);
-    proposals.most_agreed(settings.agreed, settings.merged_share)
+    proposals.most_agreed(settings.agreed, 1.0)
 }
 
 /// The transforms that are not the same as an earlier one, `most` of them at most.
