@@ -4,6 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from clutter import pose_error
+from clutter_scene import clutter_scene
+from clutter_scene import model as solid
 from finding import errors, scored
 from finding_scene import FindingScene, finding_scene, whole
 from scipy.spatial.transform import Rotation
@@ -186,3 +189,14 @@ def test_models_without_extent_or_points_are_said() -> None:
 def test_nothing_is_in_an_empty_scene() -> None:
     assert len(surfsig.find_instances(whole("figure"), np.zeros((0, 3)))) == 0
     assert len(surfsig.find_instances(whole("figure"), np.zeros((100, 3)))) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "number"), [(720, 15), (733, 8)], ids=["the fit", "the alignment"])
+def test_true_poses_were_lost_where_a_fit_left_them(seed: int, number: int) -> None:
+    """Of solids in clutter, where what a camera sees hardly determines some motions."""
+    scene = clutter_scene(seed)
+    found = surfsig.find_instances(solid(number), scene.cloud)
+    assert len(found) == 1
+    true = scene.poses[list(scene.numbers).index(number)]
+    assert pose_error(found[0].T_scene_model, true, number) < 0.05
