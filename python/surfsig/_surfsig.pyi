@@ -626,10 +626,10 @@ class FindSettings:
         """Of the model's extent, and radians, within which two of them agree."""
     @property
     def proposals(self) -> int:
-        """Proposed transforms that are judged by few points."""
+        """Proposed transforms that are aligned where the scene's viewpoint is not known."""
     @property
     def first_points(self) -> int:
-        """Points of the model in that first judgement."""
+        """Points of the model in the first alignment and judgement."""
     @property
     def first_distances(self) -> tuple[float, float, int]:
         """Voxels between correspondences in the steps of its alignment: from, to, how many."""

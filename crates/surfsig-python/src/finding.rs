@@ -24,9 +24,9 @@ settings_class! {
         agreed: usize = agreed,
         /// Of the model's extent, and radians, within which two of them agree.
         agreed_within: [f64; 2] = agreed_within,
-        /// Proposed transforms that are judged by few points.
+        /// Proposed transforms that are aligned where the scene's viewpoint is not known.
         proposals: usize = proposals,
-        /// Points of the model in that first judgement.
+        /// Points of the model in the first alignment and judgement.
         first_points: usize = first_points,
         /// Voxels between correspondences in the steps of its alignment: from, to, how many.
         first_distances: (f64, f64, usize) = first_distances,

@@ -43,11 +43,12 @@ def find_instances(
     """Find every instance of a model, or of several, in a scene: transform, score, how much of it is seen.
 
     Each place of the scene proposes transforms by the places of the model whose field signatures, of patches
-    of several sizes, are most like its own. Those that what the sensor saw supports most are fitted to the
-    scene's surface, and the probability of each is told by what of the model is confirmed, seen through or
-    not measured, how well it agrees, and whether the scene ends where the model does. The best is taken, with
-    its points, and the others are judged again without these, until none is left that is good enough. So half
-    hidden instances are found, and where there is none, none is. The result is always the same.
+    of several sizes, are most like its own. Of those that what the sensor saw speaks for, the ones that most
+    others agree with are fitted to the scene's surface, and the probability of each is told by what of the
+    model is confirmed, seen through or not measured, how well it agrees, and whether the scene ends where the
+    model does. The best is taken, with its points, and the others are judged again without these, until none
+    is left that is good enough. So half hidden instances are found, and where there is none, none is. The
+    result is always the same.
 
     Parameters
     ----------

@@ -30,11 +30,11 @@ pub struct FindSettings {
     /// Of the model's extent, and radians, within which two of them agree. With two thirds of it, 63 of the same 87 objects
     /// are found in place of 64.
     pub agreed_within: [f64; 2],
-    /// Proposed transforms that are judged by few points. With 600, 80 points each and 150 kept, 15 of the 30 half
+    /// Proposed transforms that are aligned where the scene's viewpoint is not known. With 600, 80 points each and 150 kept, 15 of the 30 half
     /// hidden figures and frusta of seeds 1 to 3 of `benchmarks/finding.py` are found, in place of 22; with 1500 and
     /// 450 kept no more.
     pub proposals: usize,
-    /// Points of the model in that first judgement.
+    /// Points of the model in the first alignment and judgement.
     pub first_points: usize,
     /// Voxels between correspondences in the steps of its alignment: from, to, how many.
     pub first_distances: (f64, f64, usize),
