@@ -258,10 +258,10 @@ impl<'a> ModelView<'a> {
 
     /// The evidence, by what depth images say where it is known from where all was seen.
     fn weighed(&self, transform: &RigidTransform, seen: Option<&Seen>, free: Free<'_>) -> Evidence {
-        if let Some(seen) = seen {
-            if !self.is_possible(&seen.judgement) {
-                return Evidence::none(self.support(&seen.judgement), seen.visible, 0.0);
-            }
+        if let Some(seen) = seen
+            && !self.is_possible(&seen.judgement)
+        {
+            return Evidence::none(self.support(&seen.judgement), seen.visible, 0.0);
         }
         let moved: Vec<SurfacePlace> =
             self.samples.iter().map(|sample| transformed(transform, sample)).collect();
