@@ -25,14 +25,14 @@ pub struct FindSettings {
     /// Of these transforms, without those that nothing speaks for, how many are aligned: those that most others agree with.
     /// Of 120 half hidden brackets and frusta (`benchmarks/finding.py`) and 87 objects in clutter (`benchmarks/clutter.py`,
     /// seeds 720 to 727 and 730 to 733) 74 and 67 are found with 100 that are half as far from each other, 81 and 64 with
-    /// 300 of these, 84 and 65 with 150 as far from each other as they agree.
+    /// 300 of these, 85 and 65 with 150 as far from each other as they agree.
     pub agreed: usize,
-    /// Of the model's extent, and radians, within which two of them agree. With two thirds of it, 63 of the same 87 objects
+    /// Of the model's extent, and radians, within which two of them agree. With 0.7 times as much 63 of the same 87 objects
     /// are found in place of 64.
     pub agreed_within: [f64; 2],
-    /// Proposed transforms that are aligned where the scene's viewpoint is not known. With 600, 80 points each and 150 kept, 15 of the 30 half
-    /// hidden figures and frusta of seeds 1 to 3 of `benchmarks/finding.py` are found, in place of 22; with 1500 and
-    /// 450 kept no more.
+    /// Proposed transforms that are aligned where the scene's viewpoint is not known. With 600, 80 points each and 150 kept,
+    /// 15 of the 30 half hidden figures and frusta of seeds 1 to 3 of `benchmarks/finding.py` are found, in place of 22; with
+    /// 1500 and 450 kept no more.
     pub proposals: usize,
     /// Points of the model in the first alignment and judgement.
     pub first_points: usize,
