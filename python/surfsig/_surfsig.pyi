@@ -584,6 +584,8 @@ class FindSettings:
         rough_voxel: float | None = None,
         agreed: int | None = None,
         agreed_within: Sequence[float] | None = None,
+        aligned: int | None = None,
+        support_per_vote: float | None = None,
         proposals: int | None = None,
         first_points: int | None = None,
         first_distances: tuple[float, float, int] | None = None,
@@ -620,28 +622,34 @@ class FindSettings:
         """Voxels of that judgement in the model's extent."""
     @property
     def agreed(self) -> int:
-        """Of these transforms, how many are aligned: those that most others agree with."""
+        """Of these transforms, how many are judged by more points: those that most others agree with."""
     @property
     def agreed_within(self) -> list[float]:
         """Of the model's extent, and radians, within which two of them agree."""
+    @property
+    def aligned(self) -> int:
+        """Of these, how many are aligned, by votes and support together."""
+    @property
+    def support_per_vote(self) -> float:
+        """Share of the model that, where it is confirmed, counts as much as e times the votes."""
     @property
     def proposals(self) -> int:
         """Proposed transforms that are aligned where the scene's viewpoint is not known."""
     @property
     def first_points(self) -> int:
-        """Points of the model in the first alignment and judgement."""
+        """Points of the model in their alignment and judgement."""
     @property
     def first_distances(self) -> tuple[float, float, int]:
-        """Voxels between correspondences in the steps of its alignment: from, to, how many."""
+        """Voxels between correspondences in the steps of that alignment: from, to, how many."""
     @property
     def kept(self) -> int:
-        """Proposals that are judged by more points."""
+        """Of these, how many are judged by more points."""
     @property
     def coarse_points(self) -> int:
-        """Points of the model in that second judgement."""
+        """Points of the model by which few transforms are aligned and judged, wherever they come from."""
     @property
     def coarse_distances(self) -> tuple[float, float, int]:
-        """Voxels between correspondences in the steps of its alignment."""
+        """Voxels between correspondences in the steps of that alignment."""
     @property
     def coarse_voxels(self) -> float:
         """Voxels of both judgements, in those of the last."""

@@ -20,21 +20,25 @@ settings_class! {
         few_points: usize = few_points,
         /// Voxels of that judgement in the model's extent.
         rough_voxel: f64 = rough_voxel,
-        /// Of these transforms, how many are aligned: those that most others agree with.
+        /// Of these transforms, how many are judged by more points: those that most others agree with.
         agreed: usize = agreed,
         /// Of the model's extent, and radians, within which two of them agree.
         agreed_within: [f64; 2] = agreed_within,
+        /// Of these, how many are aligned, by votes and support together.
+        aligned: usize = aligned,
+        /// Share of the model that, where it is confirmed, counts as much as e times the votes.
+        support_per_vote: f64 = support_per_vote,
         /// Proposed transforms that are aligned where the scene's viewpoint is not known.
         proposals: usize = proposals,
-        /// Points of the model in the first alignment and judgement.
+        /// Points of the model in their alignment and judgement.
         first_points: usize = first_points,
-        /// Voxels between correspondences in the steps of its alignment: from, to, how many.
+        /// Voxels between correspondences in the steps of that alignment: from, to, how many.
         first_distances: (f64, f64, usize) = first_distances,
-        /// Proposals that are judged by more points.
+        /// Of these, how many are judged by more points.
         kept: usize = kept,
-        /// Points of the model in that second judgement.
+        /// Points of the model by which few transforms are aligned and judged, wherever they come from.
         coarse_points: usize = coarse_points,
-        /// Voxels between correspondences in the steps of its alignment.
+        /// Voxels between correspondences in the steps of that alignment.
         coarse_distances: (f64, f64, usize) = coarse_distances,
         /// Voxels of both judgements, in those of the last.
         coarse_voxels: f64 = coarse_voxels,

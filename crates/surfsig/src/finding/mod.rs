@@ -1,6 +1,6 @@
 //! Where instances of models are in a scene: [`find_instances`].
 //!
-//! Each place of the scene proposes a transform by the place of a model that it is most similar to ([`proposals`]).
+//! Each place of the scene proposes transforms by the places of a model that it is most similar to ([`proposals`]).
 //! Those that many agree on are fitted to the scene's surface and judged by what the sensor saw ([`evidence`],
 //! [`rim`]); the best ones become instances, each of which takes its points away from the others ([`acceptance`]) and is
 //! tried to be refuted ([`examination`]).
@@ -31,7 +31,7 @@ use crate::{Error, FieldPlaces, Monitor, Scan, with_threads};
 use acceptance::{Candidate, Sought, accepted, least_before_fit};
 use evidence::{Evidence, ModelView};
 use model::{MIN_POINTS, SPACINGS_PER_RADIUS, on_ladder};
-use proposals::{different, most_agreed, proposed_transforms, raw_transforms};
+use proposals::{Proposals, different, weighted_transforms};
 use rival_candidates::rival_log_odds;
 use scene::{Free, Scene};
 use std::sync::Arc;
@@ -130,19 +130,20 @@ fn candidates_of<'a>(
             ModelView::new(&side, Arc::clone(surface), scene.viewpoint, most, settings)
         };
         let [distance, angle] = [settings.same[0] * side.places.radius, settings.same[1]];
-        let proposed = if scene.viewpoint.is_some() {
-            let pairs = side.all_places().zip(&places);
-            let raw: Vec<RigidTransform> =
-                pairs.flat_map(|(own, seen)| raw_transforms(own, seen, settings.similar)).collect();
-            let supported = supported(&view(&rough, settings.few_points), &raw);
-            most_agreed(&supported, side.extent(), settings)
-        } else {
-            proposed_transforms(&side.places, &places[0], settings)
-        };
-        let first = view(&coarse, settings.first_points);
-        let kept = best_first(&first, &proposed, settings.first_distances);
-        let kept = different(kept, settings.kept, distance, angle);
         let second = view(&coarse, settings.coarse_points);
+        let kept = if scene.viewpoint.is_some() {
+            let matched = side.all_places().zip(&places);
+            let weighted: Vec<(RigidTransform, f64)> =
+                matched.flat_map(|(own, seen)| weighted_transforms(own, seen, settings.similar)).collect();
+            let supported = supported(&view(&rough, settings.few_points), &weighted);
+            let agreed = Proposals::of_weighted(&supported, side.extent(), settings).most_agreed();
+            most_supported(&second, &agreed, settings)
+        } else {
+            let proposed = Proposals::of_best_matches(&side.places, &places[0], settings).most_agreed();
+            let proposed: Vec<RigidTransform> = proposed.into_iter().map(|(one, _)| one).collect();
+            let kept = best_first(&view(&coarse, settings.first_points), &proposed, settings.first_distances);
+            different(kept, settings.kept, distance, angle)
+        };
         let tried = best_first(&second, &kept, settings.coarse_distances);
         let tried = different(tried, settings.tried, distance, angle);
         monitor.check()?;
@@ -179,9 +180,26 @@ fn log_odds(probability: f64) -> f64 {
 }
 
 /// The transforms that what the sensor saw speaks for.
-fn supported(view: &ModelView<'_>, transforms: &[RigidTransform]) -> Vec<RigidTransform> {
-    let supports = view.supports(transforms);
-    transforms.iter().zip(supports).filter(|(_, support)| *support > 0.0).map(|(one, _)| *one).collect()
+fn supported(view: &ModelView<'_>, weighted: &[(RigidTransform, f64)]) -> Vec<(RigidTransform, f64)> {
+    let transforms: Vec<RigidTransform> = weighted.iter().map(|(one, _)| *one).collect();
+    let supports = view.supports(&transforms);
+    weighted.iter().zip(supports).filter(|(_, support)| *support > 0.0).map(|(one, _)| *one).collect()
+}
+
+/// Of the transforms that most others agree with, each of which comes with its votes, those that have most votes and are
+/// supported most by what the sensor saw.
+fn most_supported(
+    view: &ModelView<'_>,
+    agreed: &[(RigidTransform, f64)],
+    settings: &FindSettings,
+) -> Vec<RigidTransform> {
+    let transforms: Vec<RigidTransform> = agreed.iter().map(|(one, _)| *one).collect();
+    let supports = view.supports(&transforms);
+    let rate = |votes: f64, support: f64| votes.ln() + support / settings.support_per_vote;
+    let rates = agreed.iter().zip(supports).map(|((one, votes), support)| (*one, rate(*votes, support)));
+    let mut rated: Vec<(RigidTransform, f64)> = rates.collect();
+    rated.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+    rated.into_iter().take(settings.aligned).map(|(one, _)| one).collect()
 }
 
 /// Transforms that anything speaks for, aligned by the samples of a view where that is better; the best first.

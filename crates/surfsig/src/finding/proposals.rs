@@ -5,18 +5,18 @@
 //! localization via pose clustering, 1987).
 
 use super::FindSettings;
-use crate::FieldPlaces;
 use crate::field::{match_fields, similar_places};
 use crate::geometry::RigidTransform;
 use crate::kd_tree::KdTree;
+use crate::{FieldMatch, FieldPlaces};
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 /// Proposals that a thread counts votes for at a time.
 const PART: usize = 64;
 
-/// Proposed transforms and how much each counts.
-struct Proposals {
+/// Proposed transforms (T_scene_model) and how much each counts.
+pub(super) struct Proposals {
     translations: Vec<[f64; 3]>,
     rotations: Vec<UnitQuaternion<f64>>,
     weights: Vec<f64>,
@@ -25,14 +25,15 @@ struct Proposals {
     distance: f64,
     /// Between quaternions of rotations that agree: the angle between these is twice that of the quaternions.
     chord: f64,
+    /// How many of the most agreed ones are given, at most.
+    most: usize,
+    /// Of the distances within which two agree, those of which only the more agreed one is given.
+    merged: f64,
 }
 
 impl Proposals {
     fn new(transforms: &[RigidTransform], weights: Vec<f64>, distance: f64, angle: f64) -> Self {
         let translations: Vec<[f64; 3]> = transforms.iter().map(|one| one.translation.into()).collect();
-        let quaternion = |one: &RigidTransform| {
-            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(one.rotation))
-        };
         Self {
             rotations: transforms.iter().map(quaternion).collect(),
             weights,
@@ -40,7 +41,33 @@ impl Proposals {
             translations,
             distance,
             chord: 0.5 * angle,
+            most: usize::MAX,
+            merged: 1.0,
         }
+    }
+
+    /// Each place of the scene proposes a transform by the place of the model that it is most similar to, and counts by how
+    /// similar the two are; a place of the model that much of the scene is similar to counts less.
+    pub fn of_best_matches(model: &FieldPlaces, scene: &FieldPlaces, settings: &FindSettings) -> Self {
+        let matches = match_fields(scene, model, false);
+        let counts = counts(&matches, model);
+        let weights = matches.iter().map(|one| similarity(one) / counts[one.target]).collect();
+        let transforms: Vec<RigidTransform> =
+            matches.iter().map(|one| one.T_target_source.inverse()).collect();
+        let [distance, angle] = settings.agreement;
+        Self {
+            most: settings.proposals,
+            merged: settings.merged_share,
+            ..Self::new(&transforms, weights, distance * model.radius, angle)
+        }
+    }
+
+    /// Of weighted transforms that agree by the model's extent. Of those that agree with one another only one is given, so
+    /// that a turn about an axis that hardly shows is tried at many angles.
+    pub fn of_weighted(weighted: &[(RigidTransform, f64)], extent: f64, settings: &FindSettings) -> Self {
+        let [distance, angle] = settings.agreed_within;
+        let (transforms, weights): (Vec<RigidTransform>, Vec<f64>) = weighted.iter().copied().unzip();
+        Self { most: settings.agreed, ..Self::new(&transforms, weights, distance * extent, angle) }
     }
 
     /// The numbers of proposals that agree with one, with their squared scaled distances, below 1; in ascending order.
@@ -60,11 +87,16 @@ impl Proposals {
         }
     }
 
-    /// Of each proposal the weights of those that agree with it, close ones counting more.
+    /// The weights of proposals that agree, close ones counting more.
+    fn weight(&self, agreeing: &[(usize, f64)]) -> f64 {
+        agreeing.iter().map(|&(other, square)| self.weights[other] * (1.0 - square)).sum()
+    }
+
+    /// Of each proposal the weights of those that agree with it.
     fn votes(&self) -> Vec<f64> {
         let of_one = |(near, found): &mut (Vec<u32>, Vec<(usize, f64)>), one: usize| {
             self.agreeing(one, near, found);
-            found.iter().map(|&(other, square)| self.weights[other] * (1.0 - square)).sum()
+            self.weight(found)
         };
         let numbers = (0..self.weights.len()).into_par_iter().with_min_len(PART);
         numbers.map_init(|| (Vec::new(), Vec::new()), of_one).collect()
@@ -89,21 +121,21 @@ impl Proposals {
         RigidTransform { rotation: *rotation.matrix(), translation: translation / sum }
     }
 
-    /// The most agreed transforms, of those within `merged` of each other only the most agreed one.
-    fn most_agreed(&self, count: usize, merged: f64) -> Vec<RigidTransform> {
+    /// The most agreed transforms with the weights of those that agree with them, the most agreed first.
+    pub fn most_agreed(&self) -> Vec<(RigidTransform, f64)> {
         let votes = self.votes();
         let mut order: Vec<usize> = (0..votes.len()).collect();
         order.sort_by(|&a, &b| votes[b].total_cmp(&votes[a]));
         let mut is_left = vec![true; votes.len()];
         let (mut near, mut found, mut chosen) = (Vec::new(), Vec::new(), Vec::new());
         for one in order {
-            if chosen.len() == count {
+            if chosen.len() == self.most {
                 break;
             }
             if is_left[one] {
                 self.agreeing(one, &mut near, &mut found);
-                chosen.push(self.mean(one, &found));
-                let same = found.iter().filter(|(_, square)| *square < merged * merged);
+                chosen.push((self.mean(one, &found), votes[one]));
+                let same = found.iter().filter(|(_, square)| *square < self.merged * self.merged);
                 same.for_each(|&(other, _)| is_left[other] = false);
             }
         }
@@ -111,46 +143,35 @@ impl Proposals {
     }
 }
 
-/// T_scene_model, the most agreed first.
-///
-/// Each place of the scene proposes one, by the place of the model that it is most similar to. A proposal counts the
-/// others that agree with it, each by how similar its two places are; a place of the model that much of the scene is
-/// similar to counts less.
-pub(super) fn proposed_transforms(
+fn quaternion(transform: &RigidTransform) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(transform.rotation))
+}
+
+/// T_scene_model by each place of the scene and each of the places of the model that are most similar to it, and how much
+/// each counts: the more similar the two are, and the fewer places of the scene are similar to that of the model. Many are
+/// wrong: they are for a judgement that costs little.
+pub(super) fn weighted_transforms(
     model: &FieldPlaces,
     scene: &FieldPlaces,
-    settings: &FindSettings,
-) -> Vec<RigidTransform> {
-    let matches = match_fields(scene, model, false);
-    let mut counts = vec![0.0_f64; model.len()];
+    count: usize,
+) -> Vec<(RigidTransform, f64)> {
+    let matches = similar_places(scene, model, count);
+    let mean = matches.len() as f64 / model.len().max(1) as f64;
+    let counts = counts(&matches, model);
+    let weight = |one: &FieldMatch| similarity(one) / (1.0 + counts[one.target] / mean);
+    matches.par_iter().map(|one| (one.T_target_source.inverse(), weight(one))).collect()
+}
+
+/// How many matches each place of the model has.
+fn counts(matches: &[FieldMatch], model: &FieldPlaces) -> Vec<f64> {
+    let mut counts = vec![0.0; model.len()];
     matches.iter().for_each(|one| counts[one.target] += 1.0);
-    let weight = |one: &crate::FieldMatch| {
-        let similarity = (1.0 - 0.5 * f64::from(one.distance).powi(2)).max(0.0);
-        similarity / counts[one.target]
-    };
-    let transforms: Vec<RigidTransform> = matches.iter().map(|one| one.T_target_source.inverse()).collect();
-    let [distance, angle] = settings.agreement;
-    let weights = matches.iter().map(weight).collect();
-    let proposals = Proposals::new(&transforms, weights, distance * model.radius, angle);
-    proposals.most_agreed(settings.proposals, settings.merged_share)
+    counts
 }
 
-/// T_scene_model by each place of the scene and each of the places of the model that are most similar to it. Many are
-/// wrong: they are for a judgement that costs little.
-pub(super) fn raw_transforms(model: &FieldPlaces, scene: &FieldPlaces, count: usize) -> Vec<RigidTransform> {
-    similar_places(scene, model, count).par_iter().map(|one| one.T_target_source.inverse()).collect()
-}
-
-/// The transforms that most others agree with, by the model's extent; each counts the same. Of those that agree with one
-/// another only one is given, so that a turn about an axis that hardly shows is tried at many angles.
-pub(super) fn most_agreed(
-    transforms: &[RigidTransform],
-    extent: f64,
-    settings: &FindSettings,
-) -> Vec<RigidTransform> {
-    let [distance, angle] = settings.agreed_within;
-    let proposals = Proposals::new(transforms, vec![1.0; transforms.len()], distance * extent, angle);
-    proposals.most_agreed(settings.agreed, 1.0)
+/// Scalar product of the two signatures.
+fn similarity(one: &FieldMatch) -> f64 {
+    (1.0 - 0.5 * f64::from(one.distance).powi(2)).max(0.0)
 }
 
 /// The transforms that are not the same as an earlier one, `most` of them at most.
@@ -229,8 +250,9 @@ mod tests {
         // A rotation by almost pi: quaternions of both signs.
         let (large, small) = ([3.1, 0.1, 0.0, 1.0, 2.0, 3.0], [0.0, 0.3, 0.0, -4.0, 0.0, 0.0]);
         let all: Vec<RigidTransform> = near(small, 20, 1).chain(near(large, 60, 999)).collect();
-        let found = Proposals::new(&all, vec![1.0; 80], 0.5, 0.35).most_agreed(2, 0.5);
-        for (found, twist) in found.iter().zip([large, small]) {
+        let proposals = Proposals::new(&all, vec![1.0; 80], 0.5, 0.35);
+        let found = Proposals { most: 2, merged: 0.5, ..proposals }.most_agreed();
+        for ((found, _), twist) in found.iter().zip([large, small]) {
             let off = (RigidTransform::exp(twist).inverse() * *found).log();
             assert!(off.iter().all(|x| x.abs() < 0.01), "{off:?}");
         }
@@ -253,11 +275,32 @@ mod tests {
         };
         let mut all: Vec<RigidTransform> = (0..400).map(anywhere).collect();
         (0..8).for_each(|i| all.insert(50 * i, near(i)));
-        let found = most_agreed(&all, extent, &settings);
+        let weighted: Vec<(RigidTransform, f64)> = all.iter().map(|one| (*one, 1.0)).collect();
+        let found = Proposals::of_weighted(&weighted, extent, &settings).most_agreed();
         assert_eq!(found.len(), 3);
-        let gap = (found[0].translation - truth.translation).norm();
-        let turn = (truth.inverse() * found[0]).log()[..3].iter().map(|x| x * x).sum::<f64>().sqrt();
+        let gap = (found[0].0.translation - truth.translation).norm();
+        let turn = (truth.inverse() * found[0].0).log()[..3].iter().map(|x| x * x).sum::<f64>().sqrt();
         assert!(gap < 0.2 * distance * extent && turn < 0.2 * angle, "{gap} {turn}");
+    }
+
+    #[test]
+    fn matches_with_common_places_of_the_model_count_less() {
+        let places = |of: &[usize]| {
+            let mut places = FieldPlaces::new(1.0);
+            for (i, &which) in of.iter().enumerate() {
+                places.vectors.push(std::array::from_fn(|k| f32::from(k == which)));
+                places.points.push([i as f64, 0.0, 0.0]);
+                places.axes.push([0.0, 0.0, 1.0]);
+                places.tangents.push([1.0, 0.0, 0.0]);
+                places.phases.push([Default::default(); _]);
+            }
+            places
+        };
+        // Two matches for each place of the model in the mean: three and one.
+        let weighted = weighted_transforms(&places(&[0, 1]), &places(&[0, 0, 1, 0]), 1);
+        let weights: Vec<f64> = weighted.iter().map(|(_, weight)| *weight).collect();
+        assert_eq!(weights, [0.4, 0.4, 1.0 / 1.5, 0.4]);
+        assert_eq!(weighted[2].0.transform_point([1.0, 0.0, 0.0]), [2.0, 0.0, 0.0]);
     }
 
     #[test]
