@@ -640,7 +640,7 @@ class FindSettings:
         """Points of the model in their alignment and judgement."""
     @property
     def first_distances(self) -> tuple[float, float, int]:
-        """Voxels between correspondences in the steps of that alignment: from, to, how many."""
+        """Voxels between correspondences in the steps of the first alignment: from, to, how many."""
     @property
     def kept(self) -> int:
         """Of these, how many are judged by more points."""

@@ -32,7 +32,7 @@ settings_class! {
         proposals: usize = proposals,
         /// Points of the model in their alignment and judgement.
         first_points: usize = first_points,
-        /// Voxels between correspondences in the steps of that alignment: from, to, how many.
+        /// Voxels between correspondences in the steps of the first alignment: from, to, how many.
         first_distances: (f64, f64, usize) = first_distances,
         /// Of these, how many are judged by more points.
         kept: usize = kept,

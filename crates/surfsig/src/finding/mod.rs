@@ -141,10 +141,14 @@ fn candidates_of<'a>(
         } else {
             let proposed = Proposals::of_best_matches(&side.places, &places[0], settings).most_agreed();
             let proposed: Vec<RigidTransform> = proposed.into_iter().map(|(one, _)| one).collect();
-            let kept = best_first(&view(&coarse, settings.first_points), &proposed, settings.first_distances);
+            let kept =
+                best_first(&view(&coarse, settings.first_points), &proposed, &[settings.first_distances]);
             different(kept, settings.kept, distance, angle)
         };
-        let tried = best_first(&second, &kept, settings.coarse_distances);
+        let all_distances = [settings.first_distances, settings.coarse_distances];
+        // Without a viewpoint the first alignment was made by fewer points.
+        let left = if scene.viewpoint.is_some() { &all_distances[..] } else { &all_distances[1..] };
+        let tried = best_first(&second, &kept, left);
         let tried = different(tried, settings.tried, distance, angle);
         monitor.check()?;
         if tried.is_empty() {
@@ -202,14 +206,17 @@ fn most_supported(
     rated.into_iter().take(settings.aligned).map(|(one, _)| one).collect()
 }
 
-/// Transforms that anything speaks for, aligned by the samples of a view where that is better; the best first.
+/// Transforms that anything speaks for, aligned by the samples of a view, by one range of distances after the other, where
+/// that is better; the best first.
 fn best_first(
     view: &ModelView<'_>,
     transforms: &[RigidTransform],
-    distances: (f64, f64, usize),
+    distances: &[(f64, f64, usize)],
 ) -> impl Iterator<Item = RigidTransform> + use<> {
     let judged = |transforms: &[RigidTransform]| view.judged(transforms, Free::All);
-    let aligned = view.aligned(transforms, distances, usize::MAX);
+    let aligned = distances
+        .iter()
+        .fold(transforms.to_vec(), |transforms, range| view.aligned(&transforms, *range, usize::MAX));
     let mut all: Vec<(RigidTransform, Evidence)> =
         transforms.iter().copied().zip(judged(transforms)).collect();
     for (best, after) in all.iter_mut().zip(aligned.iter().copied().zip(judged(&aligned))) {
