@@ -48,7 +48,7 @@ pub struct FindSettings {
     /// Points of the model by which few transforms are aligned and judged, wherever they come from.
     pub coarse_points: usize,
     /// Voxels between correspondences in the steps of that alignment. Where the viewpoint is known, those of the first one are
-    /// before them: without, 124 of the 166 objects are found in place of 125.
+    /// before them: without, 124 of the 166 objects are found in place of 125 (60 aligned).
     pub coarse_distances: (f64, f64, usize),
     /// Voxels of both judgements, in those of the last.
     pub coarse_voxels: f64,
