@@ -66,8 +66,8 @@ def test_files_that_are_no_library_are_said(path: Path, tmp_path: Path) -> None:
     with pytest.raises(surfsig.FileFormatError, match="not a library"):
         Library(tmp_path / "other.db")
     with sqlite3.connect(path) as store:
-        store.execute("PRAGMA user_version = 3")
-    with pytest.raises(surfsig.FileFormatError, match="version 3"):
+        store.execute("PRAGMA user_version = 4")
+    with pytest.raises(surfsig.FileFormatError, match="version 4"):
         Library(path)
 
 

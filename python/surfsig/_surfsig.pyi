@@ -594,6 +594,10 @@ class FindSettings:
         coarse_distances: tuple[float, float, int] | None = None,
         coarse_voxels: float | None = None,
         tried: int | None = None,
+        brief_aligned: int | None = None,
+        brief_tried: int | None = None,
+        brief_deficit: float | None = None,
+        searched: int | None = None,
         aligned_points: int | None = None,
         fine_points: int | None = None,
         fine_distances: tuple[float, float, int] | None = None,
@@ -657,6 +661,18 @@ class FindSettings:
     def tried(self) -> int:
         """Transforms that are aligned and judged by most points."""
     @property
+    def brief_aligned(self) -> int:
+        """In the brief search for each of several models, how many transforms are aligned."""
+    @property
+    def brief_tried(self) -> int:
+        """Of these, how many are aligned and judged by most points."""
+    @property
+    def brief_deficit(self) -> float:
+        """By how much the logarithm of the odds of the best of them may be below that of what is given up."""
+    @property
+    def searched(self) -> int:
+        """How many of several models are searched after it, at most: those with the largest odds."""
+    @property
     def aligned_points(self) -> int:
         """Points of the model in their alignment."""
     @property
@@ -707,8 +723,10 @@ class FindSettings:
     def __eq__(self, value: object, /) -> bool: ...
 
 def prepare_model(scan: _Scan, *, threads: int | None = None) -> dict[str, Any]: ...
+def brief_model(model: tuple[Any, ...]) -> dict[str, Any]: ...
 def find_instances(
-    models: Sequence[tuple[Any, ...]],
+    radii: Sequence[float],
+    load: Callable[[int, bool], tuple[Any, ...]],
     scene: _Scan,
     *,
     min_score: float,

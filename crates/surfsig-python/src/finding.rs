@@ -9,7 +9,9 @@ use crate::watched::watched;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use surfsig::{FIELD_SIGNATURE, FIND_STEPS_PER_MODEL, FieldPlaces, Instance, Model, Monitor};
+use std::borrow::Cow;
+use std::sync::{Mutex, PoisonError};
+use surfsig::{FIELD_SIGNATURE, FIND_STEPS_PER_MODEL, FieldPlaces, Instance, Model, ModelSource, Monitor};
 
 settings_class! {
     /// How instances are searched and judged, for experts; see `surfsig.find_instances`.
@@ -44,6 +46,14 @@ settings_class! {
         coarse_voxels: f64 = coarse_voxels,
         /// Transforms that are aligned and judged by most points.
         tried: usize = tried,
+        /// In the brief search for each of several models, how many transforms are aligned.
+        brief_aligned: usize = brief_aligned,
+        /// Of these, how many are aligned and judged by most points.
+        brief_tried: usize = brief_tried,
+        /// By how much the logarithm of the odds of the best of them may be below that of what is given up.
+        brief_deficit: f64 = brief_deficit,
+        /// How many of several models are searched after it, at most: those with the largest odds.
+        searched: usize = searched,
         /// Points of the model in their alignment.
         aligned_points: usize = aligned_points,
         /// Points of the model in their judgement.
@@ -124,6 +134,16 @@ pub fn prepare_model<'py>(
     let scan = scan.scan()?;
     let work = |monitor: &Monitor| Model::new(&scan, threads, monitor);
     let model = watched(py, None, None, work)?;
+    model_to_python(py, model)
+}
+
+/// What tells whether a model may be in a scene; by the names of the crate's `Model`, as `prepare_model`.
+#[pyfunction]
+pub fn brief_model<'py>(py: Python<'py>, model: ModelArgument<'py>) -> PyResult<Bound<'py, PyDict>> {
+    model_to_python(py, model.model()?.brief())
+}
+
+fn model_to_python(py: Python<'_>, model: Model) -> PyResult<Bound<'_, PyDict>> {
     let result = PyDict::new(py);
     let matrix = |points: Vec<[f64; 3]>| {
         let count = points.len();
@@ -157,14 +177,54 @@ fn places_to_python(py: Python<'_>, places: FieldPlaces) -> PyResult<Bound<'_, P
     Ok(arrays)
 }
 
-/// Find instances of models; see `surfsig.find_instances`. Of each, by the names of its attributes, with the number of
-/// its model.
+/// Models that a function of Python's gives when they are needed: of a number, and whether what `Model::brief` has is enough.
+struct LoadedModels {
+    radii: Vec<f64>,
+    load: Py<PyAny>,
+    /// What the function raised.
+    raised: Mutex<Option<PyErr>>,
+}
+
+impl LoadedModels {
+    fn load(&self, number: usize, is_brief: bool) -> Result<Model, surfsig::Error> {
+        let loaded = Python::attach(|py| {
+            let loaded = self.load.bind(py).call1((number, is_brief))?;
+            loaded.extract::<ModelArgument<'_>>()?.model()
+        });
+        loaded.map_err(|error| {
+            *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+            surfsig::Error::Cancelled
+        })
+    }
+}
+
+impl ModelSource for LoadedModels {
+    fn count(&self) -> usize {
+        self.radii.len()
+    }
+
+    fn radius(&self, number: usize) -> f64 {
+        self.radii[number]
+    }
+
+    fn brief(&self, number: usize) -> Result<Cow<'_, Model>, surfsig::Error> {
+        Ok(Cow::Owned(self.load(number, true)?.brief()))
+    }
+
+    fn whole(&self, number: usize) -> Result<Cow<'_, Model>, surfsig::Error> {
+        Ok(Cow::Owned(self.load(number, false)?))
+    }
+}
+
+/// Find instances of models; see `surfsig.find_instances`. `load` gives a model by its number, and whether it may be brief.
+/// Of each instance its values by the names of its attributes, with the number of its model.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
-#[pyo3(signature = (models, scene, *, min_score, at_most=None, settings=None, threads=None, progress=None))]
+#[pyo3(signature = (radii, load, scene, *, min_score, at_most=None, settings=None, threads=None, progress=None))]
 pub fn find_instances<'py>(
     py: Python<'py>,
-    models: Vec<ModelArgument<'py>>,
+    radii: Vec<f64>,
+    load: Py<PyAny>,
     scene: ScanArgument<'py>,
     min_score: f64,
     at_most: Option<usize>,
@@ -172,17 +232,19 @@ pub fn find_instances<'py>(
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Vec<Bound<'py, PyDict>>> {
-    let models = models.iter().map(ModelArgument::model).collect::<PyResult<Vec<Model>>>()?;
-    let models: Vec<&Model> = models.iter().collect();
     let scene = scene.scan()?;
     let mut settings = settings.map_or_else(surfsig::FindSettings::default, |settings| settings.core);
     settings.min_score = min_score;
     settings.at_most = at_most.unwrap_or(usize::MAX);
     settings.threads = threads;
-    let total = 2 + FIND_STEPS_PER_MODEL * models.len();
-    let work = |monitor: &Monitor| surfsig::find_instances(&models, &scene, &settings, monitor);
-    let found = watched(py, Some(total), progress.as_ref(), work)?;
-    found.into_iter().map(|instance| to_python(py, instance)).collect()
+    let models = LoadedModels { radii, load, raised: Mutex::default() };
+    let total = 2 + FIND_STEPS_PER_MODEL * models.count();
+    let work = |monitor: &Monitor| surfsig::find_instances_of(&models, &scene, &settings, monitor);
+    let found = watched(py, Some(total), progress.as_ref(), work);
+    if let Some(raised) = models.raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        return Err(raised);
+    }
+    found?.into_iter().map(|instance| to_python(py, instance)).collect()
 }
 
 fn to_python(py: Python<'_>, instance: Instance) -> PyResult<Bound<'_, PyDict>> {

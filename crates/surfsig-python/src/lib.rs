@@ -70,7 +70,7 @@ mod _surfsig {
     #[pymodule_export]
     use crate::field::{field_keypoints, field_signatures, match_fields};
     #[pymodule_export]
-    use crate::finding::{FindSettings, find_instances, point_spacing, prepare_model};
+    use crate::finding::{FindSettings, brief_model, find_instances, point_spacing, prepare_model};
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]

@@ -93,7 +93,8 @@ pub use field::{
     match_fields,
 };
 pub use finding::{
-    FIND_STEPS_PER_MODEL, FindSettings, Instance, MODEL_STEPS, Measures, Model, find_instances,
+    FIND_STEPS_PER_MODEL, FindSettings, Instance, MODEL_STEPS, Measures, Model, ModelSource, find_instances,
+    find_instances_of,
 };
 pub use fit::{
     Cylinder, FitAxes, FitKind, FitUsed, Quadric, Sphere, SurfacePoint, fit_cylinder, fit_quadric, fit_sphere,

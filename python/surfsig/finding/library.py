@@ -24,14 +24,17 @@ from surfsig.point_cloud import PointCloud
 
 _MARK = 0x53534C42
 """SQLite's application id of such a file: "SSLB"."""
-_VERSION = 2
-"""Models of version 1 had signatures of one radius: they are prepared again when they are looked for."""
-_TABLE = """
+_VERSION = 3
+"""Models of version 1 had signatures of one radius: they are prepared again when they are looked for. Those
+of version 2 have no brief part: they are read as a whole in its place."""
+_MODELS = """
 CREATE TABLE models (
     name TEXT PRIMARY KEY, added TEXT NOT NULL, unit TEXT, points INTEGER NOT NULL, radius REAL NOT NULL,
     spacing REAL NOT NULL, sided INTEGER NOT NULL, size INTEGER NOT NULL, arrays BLOB NOT NULL
 )
 """
+_BRIEFS = "CREATE TABLE IF NOT EXISTS briefs (name TEXT PRIMARY KEY, arrays BLOB NOT NULL)"
+"""What tells whether a model may be in a scene is read of every model: so it is apart, and not compressed."""
 _SIGNATURES = ("points", "vectors", "axes", "tangents", "phases", "count", "status")
 _LARGEST = 1 << 32
 """Bytes that a model may take."""
@@ -47,7 +50,9 @@ class LibraryEntry(NamedTuple):
     """Of its coordinates, as somebody said."""
     points: int
     radius: float
-    """Of the patches that it is described by."""
+    """Of the smallest patches that it is described by."""
+    spacing: float
+    """Between its points."""
 
 
 class Library:
@@ -123,13 +128,14 @@ class Library:
             raise self._taken(name)
         prepared = model_of(model, threads=threads)
         added = datetime.now(timezone.utc).isoformat(timespec="seconds")
-        packed, size = _packed(prepared)
-        entry = LibraryEntry(name, added, unit, len(prepared.points), prepared.radius)
+        whole, brief = _stored(prepared), _stored(prepared.brief())
+        entry = LibraryEntry(name, added, unit, len(prepared.points), prepared.radius, prepared.spacing)
         with self._opened(create=True) as store:
             verb = "INSERT OR REPLACE" if replace else "INSERT"
-            row = (*entry, prepared.spacing, prepared.is_sided, size, packed)
+            row = (*entry, prepared.is_sided, len(whole), zlib.compress(whole, 1))
             try:
                 store.execute(f"{verb} INTO models VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
+                store.execute("INSERT OR REPLACE INTO briefs VALUES (?, ?)", (name, brief))
             except sqlite3.IntegrityError:
                 raise self._taken(name) from None
         return entry
@@ -150,7 +156,9 @@ class Library:
         if not self.path.exists():
             return []
         with self._opened() as store:
-            rows = store.execute("SELECT name, added, unit, points, radius FROM models ORDER BY name")
+            rows = store.execute(
+                "SELECT name, added, unit, points, radius, spacing FROM models ORDER BY name"
+            )
             return [LibraryEntry(*row) for row in rows]
 
     def names(self) -> tuple[str, ...]:
@@ -180,6 +188,8 @@ class Library:
         with self._opened() as store:
             if not store.execute("DELETE FROM models WHERE name = ?", (name,)).rowcount:
                 raise self._missing(name)
+            if _has_briefs(store):
+                store.execute("DELETE FROM briefs WHERE name = ?", (name,))
 
     def get(self, name: str) -> PointCloud:
         """Give a model's points.
@@ -217,13 +227,15 @@ class Library:
                 )
                 tables = store.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
                 if create and not tables and mark == 0:
-                    store.execute(_TABLE)
+                    store.execute(_MODELS)
+                    store.execute(_BRIEFS)
                     store.execute(f"PRAGMA application_id = {_MARK}")
                     store.execute(f"PRAGMA user_version = {_VERSION}")
                 elif mark != _MARK:
                     raise FileFormatError(f"{self.path}: not a library of models")
                 elif create and version < _VERSION:
                     # What older versions cannot read is about to be written.
+                    store.execute(_BRIEFS)
                     store.execute(f"PRAGMA user_version = {_VERSION}")
                 elif version > _VERSION:
                     raise FileFormatError(
@@ -242,22 +254,32 @@ class Library:
         return InvalidInputError(f"{self.path}: there is no model {name!r}")
 
 
-def stored_model(library: Library, name: str) -> Model:
-    """Give a model of a library as `find_instances` looks for it; errors as of `Library.get`."""
+def stored_model(library: Library, name: str, is_brief: bool = False) -> Model:
+    """Give a model as `find_instances` takes it, or what `Model.brief` has; errors as of `Library.get`."""
     rows: list[tuple[Any, ...]] = []
+    briefs: list[tuple[bytes]] = []
     if library.path.exists():
         with library._opened() as store:
-            query = "SELECT radius, spacing, sided, size, arrays FROM models WHERE name = ?"
-            rows = store.execute(query, (name,)).fetchall()
+            if is_brief and _has_briefs(store):
+                briefs = store.execute("SELECT arrays FROM briefs WHERE name = ?", (name,)).fetchall()
+            columns = "radius, spacing, sided" if briefs else "radius, spacing, sided, size, arrays"
+            rows = store.execute(f"SELECT {columns} FROM models WHERE name = ?", (name,)).fetchall()
     if not rows:
         raise library._missing(name)
     try:
-        return _unpacked(*rows[0])
+        radius, spacing, is_sided, *packed = rows[0]
+        content = briefs[0][0] if briefs else _decompressed(*packed)
+        return _model(content, radius, spacing, bool(is_sided))
     except (ValueError, KeyError, TypeError, zlib.error, zipfile.BadZipFile):
         raise FileFormatError(f"{library.path}: the model {name!r} is damaged") from None
 
 
-def _packed(model: Model) -> tuple[bytes, int]:
+def _has_briefs(store: sqlite3.Connection) -> bool:
+    query = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = 'briefs'"
+    return bool(store.execute(query).fetchone()[0])
+
+
+def _stored(model: Model) -> bytes:
     arrays: dict[str, NDArray[Any]] = {
         "points": model.points,
         "middle": model.center,
@@ -269,15 +291,19 @@ def _packed(model: Model) -> tuple[bytes, int]:
         arrays |= {f"signature_{number}_{name}": getattr(signatures, name) for name in _SIGNATURES}
     file = io.BytesIO()
     np.savez(file, allow_pickle=False, **arrays)
-    return zlib.compress(file.getvalue(), 1), file.tell()
+    return file.getvalue()
 
 
-def _unpacked(radius: float, spacing: float, sided: int, size: int, packed: bytes) -> Model:
+def _decompressed(size: int, packed: bytes) -> bytes:
     if not 0 < size <= min(_LARGEST, 1100 * len(packed)):
         raise ValueError("a size that the data cannot have")
     content = zlib.decompressobj().decompress(packed, size)
     if len(content) != size:
         raise ValueError("shorter than it was")
+    return content
+
+
+def _model(content: bytes, radius: float, spacing: float, is_sided: bool) -> Model:
     with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
         whole = (arrays[name] for name in ("points", "middle", "places", "normals"))
         points, center, samples, normals = whole
@@ -290,4 +316,4 @@ def _unpacked(radius: float, spacing: float, sided: int, size: int, packed: byte
             own = float(arrays[f"radius_{number}"])
             signatures.append(FieldSignatures(radius=own, oriented=True, indices=None, **known))
     first, *larger = signatures
-    return Model(points, center, spacing, radius, samples, normals, first, tuple(larger), bool(sided))
+    return Model(points, center, spacing, radius, samples, normals, first, tuple(larger), is_sided)

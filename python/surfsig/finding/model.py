@@ -42,6 +42,10 @@ class Model:
     is_sided: bool
     """Whether it is known which side of the surface is the outer one."""
 
+    def brief(self) -> Model:
+        """Give what tells whether it may be in a scene: the places of the largest patches, and samples."""
+        return _model(_surfsig.brief_model(self.argument()))
+
     def argument(self) -> tuple[Any, ...]:
         """Give the model as the core takes it."""
         return (
@@ -79,7 +83,10 @@ def model_of(data: PointCloud | ArrayLike, threads: int | None = None) -> Model:
     """
     cloud = PointCloud.of(data)
     scan = scan_argument(cloud.at(np.flatnonzero(cloud.finite)))
-    found = _surfsig.prepare_model(scan, threads=thread_count(threads))
+    return _model(_surfsig.prepare_model(scan, threads=thread_count(threads)))
+
+
+def _model(found: dict[str, Any]) -> Model:
     signatures = _signatures(found.pop("places"))
     larger = tuple(_signatures(places) for places in found.pop("larger_places"))
     return Model(signatures=signatures, larger_signatures=larger, **found)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -99,15 +101,16 @@ def find_instances(
     if missing.any():
         told = missing_returns_text(int(missing.sum()), len(given))
         warnings.warn(f"the scene: {told}; they are left out", stacklevel=2)
-    models = _models(model, _names(only), threads)
+    models = _source(model, _names(only), threads)
     numbers = np.flatnonzero(given.finite & ~missing & _mask(mask, len(given)))
-    if len(numbers) < _FEWEST or not models:
-        return Instances([], given, {}, len(models))
-    warn_if_too_coarse(given, max(part.radius for part in models.values()), "the scene: patches")
+    if len(numbers) < _FEWEST or not models.names:
+        return Instances([], given, {}, len(models.names))
+    warn_if_too_coarse(given, max(models.radii), "the scene: patches")
     cloud = given.at(numbers)
-    names = list(models)
+    names = models.names
     found = _surfsig.find_instances(
-        [part.argument() for part in models.values()],
+        models.radii,
+        lambda number, is_brief: models.load(names[number], is_brief).argument(),
         scan_argument(cloud),
         min_score=min_score,
         at_most=_most(at_most),
@@ -123,24 +126,45 @@ def find_instances(
         instances.append(Instance(name=name, free_directions=free, indices=indices, **values))
     if not instances:
         spacing = point_spacing(cloud.points)
-        for name, part in models.items():
+        for name, own_spacing in zip(names, models.spacings, strict=True):
             relation = "has points {ratio} times as far apart as"
-            hint = ratio_text(part.spacing, spacing, (f"the model '{name}'", "the scene"), relation)
+            hint = ratio_text(own_spacing, spacing, (f"the model '{name}'", "the scene"), relation)
             if hint is not None:
                 warnings.warn(f"nothing was found, and {hint}", stacklevel=2)
-    seen = {instance.name for instance in instances}
-    clouds = {name: PointCloud(models[name].points, models[name].center) for name in names if name in seen}
-    return Instances(instances, given, clouds, len(models))
+    whole = {instance.name: models.load(instance.name, False) for instance in instances}
+    clouds = {name: PointCloud(part.points, part.center) for name, part in sorted(whole.items())}
+    return Instances(instances, given, clouds, len(names))
 
 
-def _models(model: object, only: tuple[str, ...] | None, threads: int | None) -> dict[str, Model]:
+class _Source(NamedTuple):
+    """Models that are loaded when they are needed."""
+
+    names: tuple[str, ...]
+    radii: list[float]
+    """Of their smallest patches."""
+    spacings: list[float]
+    """Between their points."""
+    load: Callable[[str, bool], Model]
+    """Gives a model by its name, and whether what `Model.brief` has is enough."""
+
+
+def _source(model: object, only: tuple[str, ...] | None, threads: int | None) -> _Source:
     if isinstance(model, Library):
-        return {name: stored_model(model, name) for name in _chosen(model.names(), only)}
+        entries = {entry.name: entry for entry in model.list()}
+        chosen = [entries[name] for name in _chosen(tuple(entries), only)]
+        names = tuple(entry.name for entry in chosen)
+        radii, spacings = [entry.radius for entry in chosen], [entry.spacing for entry in chosen]
+        return _Source(names, radii, spacings, partial(stored_model, model))
     if isinstance(model, Mapping) and all(isinstance(name, str) for name in model):
-        return {name: model_of(model[name], threads=threads) for name in _chosen(tuple(model), only)}
-    if only is not None:
+        given = {name: model[name] for name in _chosen(tuple(model), only)}
+    elif only is None:
+        given = {"model": PointCloud.of(model)}
+    else:
         raise InvalidInputError("only chooses among the models of a library or a mapping: there is one model")
-    return {"model": model_of(PointCloud.of(model), threads=threads)}
+    models = {name: model_of(cloud, threads=threads) for name, cloud in given.items()}
+    parts = models.values()
+    radii, spacings = [part.radius for part in parts], [part.spacing for part in parts]
+    return _Source(tuple(models), radii, spacings, lambda name, _: models[name])
 
 
 def _chosen(names: tuple[str, ...], only: tuple[str, ...] | None) -> tuple[str, ...]:

@@ -133,7 +133,6 @@ pub(super) fn least_before_fit(settings: &FindSettings) -> f64 {
 pub(super) fn accepted(
     mut candidates: Vec<Candidate<'_>>,
     scene: &Scene<'_>,
-    models: &[&Model],
     settings: &FindSettings,
     monitor: &Monitor,
 ) -> Result<Vec<Instance>, Error> {
@@ -172,7 +171,7 @@ pub(super) fn accepted(
         let own: Vec<usize> = own.into_iter().filter(|&number| !is_taken[number]).collect();
         own.iter().for_each(|&number| is_taken[number] = true);
         unexplained.take(fitted, settings.own_distance);
-        instances.push(instance(&refined, examined, evidence, own, scene, models));
+        instances.push(instance(&refined, examined, evidence, own, scene));
         // Only those near it have lost something.
         let is_near = |other: &Candidate<'_>| {
             let reach = fitted.sought.view.reach + other.sought.view.reach;
@@ -242,12 +241,11 @@ fn instance(
     evidence: Evidence,
     own: Vec<usize>,
     scene: &Scene<'_>,
-    models: &[&Model],
 ) -> Instance {
     let Refined { candidate: fitted, fit, .. } = refined;
     let translated = |by: [f64; 3]| RigidTransform::from_rotation_vector([0.0; 3], by);
     let from_middle = translated(scene.scan.center);
-    let from_model = translated(models[fitted.sought.number].center).inverse();
+    let from_model = translated(fitted.sought.model.center).inverse();
     let to_scene = from_middle * fitted.T_scene_model;
     // A small motion of the scene in the model's axes is the opposite one of the model in the scene's.
     let rotation = fitted.T_scene_model.rotation;

@@ -6,6 +6,7 @@ use super::misfit::shared_part;
 use super::model::{Model, rung_above};
 use super::rim::{Rim, step_beyond_rim};
 use super::scene::{Free, SceneSurface};
+use super::side::{Side, most_seen};
 use crate::alignment::{FACING_AWAY, cosine_towards, transformed};
 use crate::depth_image::{ALIKE, DepthImage, FACING, Front, Judgement, SurfacePlace, dot};
 use crate::geometry::RigidTransform;
@@ -14,7 +15,6 @@ use crate::random::some_of;
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
-use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// Extents of a model around its middle that are looked at.
@@ -25,8 +25,6 @@ const CELL: f64 = 0.5;
 const SHARED_CELL: f64 = 1.0;
 /// Half the diagonal of a cell, in its edge: the farthest that a model's middle is from that of its cell.
 const HALF_DIAGONAL: f64 = 0.87;
-/// Directions from which it is tried how much of a model can be seen at once.
-const VIEWS: usize = 100;
 
 /// What a scene says about a transform of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,9 +103,21 @@ struct Seen {
 }
 
 impl<'a> ModelView<'a> {
-    /// Takes so many of the model's samples at most.
+    /// Takes so many of a side's samples at most.
     pub fn new(
-        model: &Model,
+        side: &Side<'_>,
+        scene: Arc<SceneSurface>,
+        viewpoint: Option<[f64; 3]>,
+        most: usize,
+        settings: &'a FindSettings,
+    ) -> Self {
+        let view = Self::without_rim(side, scene, viewpoint, most, settings);
+        Self { rim: Rim::new(side, &view.samples, view.scene.voxel, view.scene.spacing), ..view }
+    }
+
+    /// The same, which tells only what [`ModelView::supports`] gives.
+    pub fn without_rim(
+        side: &Side<'_>,
         scene: Arc<SceneSurface>,
         viewpoint: Option<[f64; 3]>,
         most: usize,
@@ -116,26 +126,24 @@ impl<'a> ModelView<'a> {
         if let Some(viewpoint) = viewpoint {
             scene.see_from(viewpoint);
         }
+        let model = &side.model;
         let chosen = some_of(model.samples.len(), most);
         let points: Vec<[f64; 3]> = chosen.iter().map(|&i| model.samples[i]).collect();
         // In the order of a tree's leaves, searches one after the other find their part of another tree in the cache.
         let near_each_other = KdTree::new(&points);
         let order: Vec<usize> = near_each_other.indices().iter().map(|&i| chosen[i as usize]).collect();
         let samples = model.surface(&order);
-        let rim = Rim::new(model, &samples, scene.voxel, scene.spacing);
-        let most_seen = most_seen(&samples);
-        let (front, reach) = (Vec::new(), REACH * model.extent());
-        let to_motions = to_motions(&samples, reach);
+        let reach = REACH * model.extent();
         Self {
-            rim,
+            rim: Rim::default(),
             scene,
             viewpoint,
             reach,
-            most_seen,
+            most_seen: most_seen(&samples),
+            to_motions: to_motions(&samples, reach),
             samples,
-            front,
-            to_motions,
-            is_closed: model.is_closed(),
+            front: Vec::new(),
+            is_closed: side.is_closed,
             settings,
         }
     }
@@ -371,19 +379,6 @@ fn to_motions(samples: &[SurfacePlace], reach: f64) -> Option<Matrix6<f64>> {
         squares += moved.transpose() * moved;
     }
     (squares / samples.len().max(1) as f64).cholesky()?.l().try_inverse()
-}
-
-/// The largest share of samples that face one of many directions, spread over the sphere by the golden angle.
-fn most_seen(samples: &[SurfacePlace]) -> f64 {
-    let golden = PI * (3.0 - 5.0_f64.sqrt());
-    let seen_from = |view: usize| {
-        let z = 1.0 - (2 * view + 1) as f64 / VIEWS as f64;
-        let (sine, cosine) = (golden * view as f64).sin_cos();
-        let across = (1.0 - z * z).sqrt();
-        let direction = [across * cosine, across * sine, z].map(|x| x as f32);
-        samples.iter().filter(|sample| dot(&sample.normal, &direction) > FACING).count()
-    };
-    (0..VIEWS).map(seen_from).max().unwrap_or(0).max(1) as f64 / samples.len().max(1) as f64
 }
 
 /// How far normals are from being parallel: 1 less the largest eigenvalue of their second moments, 0 of none.

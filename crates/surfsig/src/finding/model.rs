@@ -134,6 +134,51 @@ impl Model {
         })
     }
 
+    /// What tells whether the model may be in a scene: of its places those with the largest patches, and no points but the
+    /// samples. It takes a fifth of the memory; [`crate::ModelSource`] says what for.
+    ///
+    /// ```
+    /// # use surfsig::{Model, Monitor, PointCloud, Scan};
+    /// # let golden = std::f64::consts::PI * (5.0_f64.sqrt() - 1.0);
+    /// # let egg: Vec<[f64; 3]> = (0..4000)
+    /// #     .map(|i| {
+    /// #         let z = 1.0 - (f64::from(i) + 0.5) / 2000.0;
+    /// #         let (sine, cosine) = (golden * f64::from(i)).sin_cos();
+    /// #         [(1.0 - z * z).sqrt() * cosine, (1.0 - z * z).sqrt() * sine, 1.5 * z]
+    /// #     })
+    /// #     .collect();
+    /// let model = Model::new(&Scan::new(PointCloud::new_f64(&egg)), None, &Monitor::default())?;
+    /// let brief = model.brief();
+    /// assert!(brief.places.is_empty() && brief.larger_places.last() == model.larger_places.last());
+    /// # Ok::<(), surfsig::Error>(())
+    /// ```
+    pub fn brief(&self) -> Self {
+        let mut brief = self.without_places();
+        if self.samples.len() >= MIN_POINTS {
+            brief.points.clone_from(&self.samples);
+        }
+        match (brief.larger_places.last_mut(), self.larger_places.last()) {
+            (Some(brief), Some(largest)) => brief.clone_from(largest),
+            _ => brief.places.clone_from(&self.places),
+        }
+        brief
+    }
+
+    /// The model as it is judged.
+    pub(super) fn without_places(&self) -> Self {
+        let none = |places: &FieldPlaces| FieldPlaces::new(places.radius);
+        Self {
+            points: self.points.clone(),
+            center: self.center,
+            spacing: self.spacing,
+            samples: self.samples.clone(),
+            normals: self.normals.clone(),
+            places: none(&self.places),
+            larger_places: self.larger_places.iter().map(none).collect(),
+            is_sided: self.is_sided,
+        }
+    }
+
     /// The same with patches of about another radius.
     pub(super) fn with_radius(&self, radius: f64, monitor: &Monitor) -> Result<Self, Error> {
         Self::described(self.oriented(1.0), on_ladder(radius), self.spacing, self.is_sided, monitor)

@@ -1,11 +1,10 @@
 //! Where a model ends: there, the scene's surface must end as well.
 
-use super::model::Model;
 use super::scene::{Free, SceneSurface};
+use super::side::Side;
 use crate::alignment::transformed;
 use crate::depth_image::{SurfacePlace, dot};
 use crate::geometry::{RigidTransform, axes_across};
-use crate::kd_tree::KdTree;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
@@ -34,6 +33,7 @@ pub(super) const TOO_MUCH: f64 = 0.4;
 const OF_VIEW: f64 = 0.5;
 
 /// Points beside a model, each a step along the surface from a sample near its end.
+#[derive(Default)]
 pub(super) struct Rim {
     /// Numbers of the samples that were stepped from.
     from: Vec<u32>,
@@ -48,16 +48,14 @@ pub(super) fn step_beyond_rim(voxel: f64, spacing: f64) -> f64 {
 }
 
 impl Rim {
-    /// Steps from samples, which are some of the model's.
-    pub fn new(model: &Model, samples: &[SurfacePlace], voxel: f64, spacing: f64) -> Self {
+    /// Steps from samples, which are some of the side's.
+    pub fn new(side: &Side<'_>, samples: &[SurfacePlace], voxel: f64, spacing: f64) -> Self {
         let step_length = step_beyond_rim(voxel, spacing);
-        let tree = KdTree::new(&model.points);
-        let is_closed = model.is_closed();
-        let mean = model.normals.iter().map(|&normal| Vector3::from(normal)).sum::<Vector3<f64>>();
+        let mean = side.model.normals.iter().map(|&normal| Vector3::from(normal)).sum::<Vector3<f64>>();
         let (mut from, mut points) = (Vec::new(), Vec::new());
         for (number, sample) in (0..).zip(samples) {
             let normal = Vector3::from(sample.normal.map(f64::from));
-            if !is_closed && normal.dot(&mean) <= FACING_VIEW * mean.norm() {
+            if !side.is_closed && normal.dot(&mean) <= FACING_VIEW * mean.norm() {
                 continue;
             }
             let [across, along] = axes_across(&normal.normalize());
@@ -65,13 +63,13 @@ impl Rim {
                 let (sine, cosine) = (TAU * step as f64 / DIRECTIONS as f64).sin_cos();
                 let offset = (across * cosine + along * sine) * step_length;
                 let beside: [f64; 3] = (Vector3::from(sample.place.map(f64::from)) + offset).into();
-                if tree.nearest(beside, CLEARANCE * voxel).is_none() {
+                if side.tree.nearest(beside, CLEARANCE * voxel).is_none() {
                     from.push(number);
                     points.push(SurfacePlace { place: beside.map(|x| x as f32), normal: sample.normal });
                 }
             }
         }
-        Self { from, points, weight: if is_closed { 1.0 } else { OF_VIEW } }
+        Self { from, points, weight: if side.is_closed { 1.0 } else { OF_VIEW } }
     }
 
     /// Share of the rim where the scene goes on beyond the model under T_scene_model, half of it of a view; 0 where it ends

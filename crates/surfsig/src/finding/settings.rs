@@ -55,6 +55,15 @@ pub struct FindSettings {
     /// Transforms that are aligned and judged by most points. Of one instance the right one is among the first 9 wherever it
     /// is among 60; of five half hidden copies of two models 43 of 80 are found with 20, 48 with 60.
     pub tried: usize,
+    /// In the brief search that tells whether one of several models may be there: of the transforms that matches of its largest
+    /// patches propose, how many are aligned.
+    pub brief_aligned: usize,
+    /// Of these, how many are aligned and judged by most points.
+    pub brief_tried: usize,
+    /// By how much the logarithm of the odds of the best of them may be below that of what is given up.
+    pub brief_deficit: f64,
+    /// How many of several models are searched after it, at most: those with the largest odds.
+    pub searched: usize,
     /// Points of the model in their alignment.
     pub aligned_points: usize,
     /// Voxels between correspondences in its steps.
@@ -131,6 +140,10 @@ impl Default for FindSettings {
             coarse_distances: (2.5, 1.5, 4),
             coarse_voxels: 2.0,
             tried: 60,
+            brief_aligned: 30,
+            brief_tried: 5,
+            brief_deficit: 1.0,
+            searched: 100,
             aligned_points: 1000,
             fine_distances: (2.5, 1.5, 5),
             fine_points: 3000,

@@ -2,18 +2,22 @@
 
 mod acceptance;
 mod images;
+mod sources;
 
 use super::evidence::ModelView;
 use super::rim::Rim;
 use super::samples::mean_length;
-use super::scene::SceneSurface;
+use super::scene::{Free, SceneSurface};
+use super::side::Side;
 use super::*;
 use crate::random::uniform;
 use crate::spacing::point_spacing;
 use crate::visibility::all_seen_from;
-use crate::{FieldPlaces, PointCloud};
+use crate::{FieldPlaces, PointCloud, RigidTransform};
 use nalgebra::Vector3;
+use std::borrow::Cow;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Two ellipsoids that meet: half axes and centre of each.
 const BODY: [([f64; 3], [f64; 3]); 2] = [([1.0, 1.3, 1.6], [0.0; 3]), ([0.7, 0.5, 0.9], [0.5, 0.9, 1.0])];
@@ -21,6 +25,10 @@ const BODY: [([f64; 3], [f64; 3]); 2] = [([1.0, 1.3, 1.6], [0.0; 3]), ([0.7, 0.5
 fn inside(point: Vector3<f64>) -> bool {
     BODY.iter()
         .any(|(axes, center)| (0..3).map(|k| ((point[k] - center[k]) / axes[k]).powi(2)).sum::<f64>() < 0.999)
+}
+
+fn side(model: &Model) -> Side<'_> {
+    Side::new(Cow::Borrowed(model))
 }
 
 /// Points all over the body, and outward normals.
@@ -159,7 +167,7 @@ fn surface_of(model: &Model, voxel: f64) -> Arc<SceneSurface> {
 fn a_model_ends_where_the_scene_does() {
     let model = model_of(square(0..20, 0..20));
     let samples = model.surface(&(0..400).collect::<Vec<_>>());
-    let rim = Rim::new(&model, &samples, 1.0, 0.4);
+    let rim = Rim::new(&side(&model), &samples, 1.0, 0.4);
     let going_on = |scene: Vec<([f64; 3], Vector3<f64>)>, is_touching: bool, is_free: bool| {
         let scene = surface_of(&model_of(scene), 1.0);
         let free = vec![is_free; scene.samples().len()];
@@ -195,7 +203,7 @@ fn evidence_without_a_viewpoint_is_what_touches() {
     let model = model_of(body(1500));
     let scene: Vec<_> = body(4000).into_iter().filter(|(point, _)| point[0] + point[2] > 0.0).collect();
     let (voxel, scene) = (0.12, model_of(scene));
-    let view = ModelView::new(&model, surface_of(&scene, voxel), None, usize::MAX, &settings);
+    let view = ModelView::new(&side(&model), surface_of(&scene, voxel), None, usize::MAX, &settings);
     let off = RigidTransform::from_rotation_vector([0.01, 0.0, -0.02], [0.02, 0.01, 0.0]);
     let [there, far] =
         view.judged(&[off, RigidTransform::from_rotation_vector([0.0; 3], [9.0, 0.0, 0.0])], Free::All)[..]
@@ -304,7 +312,8 @@ fn what_is_round_is_not_determined_and_a_front_ends_where_nothing_is_beyond() {
     let measures = |all: Vec<([f64; 3], Vector3<f64>)>| {
         let seen = model_of(all.iter().filter(|(_, normal)| normal.z > 0.3).copied().collect());
         let model = model_of(all);
-        let view = ModelView::new(&model, surface_of(&seen, voxel), Some(viewpoint), usize::MAX, &settings);
+        let view =
+            ModelView::new(&side(&model), surface_of(&seen, voxel), Some(viewpoint), usize::MAX, &settings);
         let judge = |view: &ModelView<'_>| view.judged(&[RigidTransform::identity()], Free::All)[0].measures;
         assert_eq!(judge(&view).pixels, 0.0, "few samples have no front");
         judge(&view.with_front(&model))
