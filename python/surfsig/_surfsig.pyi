@@ -596,6 +596,7 @@ class FindSettings:
         tried: int | None = None,
         brief_aligned: int | None = None,
         brief_tried: int | None = None,
+        brief_points: int | None = None,
         brief_deficit: float | None = None,
         searched: int | None = None,
         aligned_points: int | None = None,
@@ -665,7 +666,10 @@ class FindSettings:
         """In the brief search for each of several models, how many transforms are aligned."""
     @property
     def brief_tried(self) -> int:
-        """Of these, how many are aligned and judged by most points."""
+        """Of these, how many are aligned again and judged."""
+    @property
+    def brief_points(self) -> int:
+        """By that many points."""
     @property
     def brief_deficit(self) -> float:
         """By how much the logarithm of the odds of the best of them may be below that of what is given up."""

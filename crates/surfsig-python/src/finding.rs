@@ -48,8 +48,10 @@ settings_class! {
         tried: usize = tried,
         /// In the brief search for each of several models, how many transforms are aligned.
         brief_aligned: usize = brief_aligned,
-        /// Of these, how many are aligned and judged by most points.
+        /// Of these, how many are aligned again and judged.
         brief_tried: usize = brief_tried,
+        /// By that many points.
+        brief_points: usize = brief_points,
         /// By how much the logarithm of the odds of the best of them may be below that of what is given up.
         brief_deficit: f64 = brief_deficit,
         /// How many of several models are searched after it, at most: those with the largest odds.

@@ -16,8 +16,12 @@ use std::sync::Arc;
 /// How much of what matches propose is tried.
 #[derive(Debug, Clone, Copy)]
 struct Effort {
+    /// Transforms that are aligned.
     aligned: usize,
+    /// Of these, those that are aligned again and judged.
     tried: usize,
+    /// By so many points.
+    points: usize,
 }
 
 /// A model before the surfaces of a scene.
@@ -91,7 +95,11 @@ impl<'a> ModelSearch<'a> {
         if !brief.is_sided || brief.all_places().all(|places| places.is_empty() || places.radius < least) {
             return Ok(f64::INFINITY);
         }
-        let effort = Effort { aligned: settings.brief_aligned, tried: settings.brief_tried };
+        let effort = Effort {
+            aligned: settings.brief_aligned,
+            tried: settings.brief_tried,
+            points: settings.brief_points,
+        };
         let search = Self::of(number, brief, scene, settings, monitor)?;
         let judged = search.sides.iter().filter_map(|side| search.judged(side, effort));
         let log_odds = judged.flat_map(|judged| judged.evidence).map(|evidence| evidence.log_odds);
@@ -100,7 +108,8 @@ impl<'a> ModelSearch<'a> {
 
     /// Transforms that are good enough where no other instance is near; the best first.
     pub fn candidates(self, monitor: &Monitor) -> Result<Vec<Candidate<'a>>, Error> {
-        let effort = Effort { aligned: self.settings.aligned, tried: self.settings.tried };
+        let FindSettings { aligned, tried, fine_points: points, .. } = *self.settings;
+        let effort = Effort { aligned, tried, points };
         let mut candidates = Vec::new();
         for side in &self.sides {
             monitor.check()?;
@@ -147,7 +156,7 @@ impl<'a> ModelSearch<'a> {
         if tried.is_empty() {
             return None;
         }
-        let view = self.view(side, &self.fine, settings.fine_points).with_front(&side.model);
+        let view = self.view(side, &self.fine, effort.points).with_front(&side.model);
         let transforms = view.aligned(&tried, settings.fine_distances, settings.aligned_points);
         let evidence = view.judged(&transforms, Free::All);
         Some(Judged { view, transforms, evidence })
