@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import resource
 import tempfile
 import time
 from dataclasses import dataclass, field
@@ -116,21 +117,37 @@ def by_peer(method: str, scene: ClutterScene) -> tuple[int, list[float]]:
     return sum(error <= RIGHT for error in errors), answer["processor"]
 
 
+def prepared(file: Path, names: dict[str, int]) -> surfsig.Library:
+    """Open a library, and add what it has not."""
+    library = surfsig.Library(file)
+    missing = [name for name in names if name not in set(library.names())]
+    for name in track(missing, "preparing", transient=True):
+        library.add(name, model(names[name]), threads=1)
+        model.cache_clear()
+    return library
+
+
 def main() -> None:
     """Look for each object alone, and for all of the library at once."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs="+", default=list(range(300, 306)))
     parser.add_argument("--alone", action="store_true", help="look for each of the shown objects alone, too")
     parser.add_argument(
+        "--models", type=int, default=LIBRARY, help="objects that there are; 8 of them are in a scene"
+    )
+    parser.add_argument("--store", type=Path, help="the library's file: prepared once, and kept")
+    parser.add_argument(
         "--peers", action="store_true", help="let OpenCV and Open3D look for each of them, too"
     )
     arguments = parser.parse_args()
-    names = {f"object {number}": number for number in range(LIBRARY)}
+    names = {f"object {number}": number for number in range(arguments.models)}
+    store = None if arguments.store is None else prepared(arguments.store, names)
     together, alone = Tally(), Tally()
     for seed in track(arguments.seeds, transient=True):
-        scene = clutter_scene(seed)
+        scene = clutter_scene(seed, library=arguments.models)
         start = time.process_time()
-        found = surfsig.find_instances({name: model(k) for name, k in names.items()}, scene.cloud, threads=1)
+        models = {name: model(k) for name, k in names.items()} if store is None else store
+        found = surfsig.find_instances(models, scene.cloud, threads=1)
         together.seconds.append(time.process_time() - start)
         together.add(scene, found, names)
         if arguments.alone:
@@ -147,9 +164,10 @@ def main() -> None:
                     scene.distance,
                 )
                 alone.add(of_one, found, names)
-    print(
-        together.report(f"{LIBRARY} models at once, prepared in the same call, {len(arguments.seeds)} scenes")
-    )
+    when = "prepared in the same call" if store is None else "prepared before"
+    print(together.report(f"{len(names)} models at once, {when}, {len(arguments.seeds)} scenes"))
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    print(f"  largest memory of the process: {peak / 1e6:.0f} MB")
     if arguments.peers:
         for method in ("opencv", "open3d"):
             told = [by_peer(method, clutter_scene(seed)) for seed in arguments.seeds]

@@ -79,6 +79,74 @@ def test_a_damaged_model_is_said(path: Path, change: str) -> None:
         Library(path).get("figure")
 
 
+def briefs(path: Path) -> list[str]:
+    with sqlite3.connect(path) as store:
+        return [name for (name,) in store.execute("SELECT name FROM briefs ORDER BY name")]
+
+
+def test_the_brief_part_comes_and_goes_with_the_model(path: Path) -> None:
+    library = Library(path)
+    library.add("again", whole("figure", 3000))
+    assert briefs(path) == ["again", "figure"]
+    brief, model = stored_model(library, "again", True), stored_model(library, "again")
+    largest = brief.larger_signatures[-1]
+    np.testing.assert_array_equal(largest.vectors, model.larger_signatures[-1].vectors)
+    assert len(brief.points) == len(model.samples)
+    assert len(brief.signatures) == 0 < len(model.signatures)
+    library.add("again", whole("bracket with pin", 3000), replace=True)
+    assert len(stored_model(library, "again", True).larger_signatures[-1]) != len(largest)
+    library.remove("again")
+    assert briefs(path) == ["figure"]
+
+
+def test_libraries_of_version_2_have_no_brief_parts(path: Path) -> None:
+    with sqlite3.connect(path) as store:
+        store.execute("DROP TABLE briefs")
+        store.execute("PRAGMA user_version = 2")
+    library = Library(path)
+    assert len(stored_model(library, "figure", True).signatures) > 0
+    library.add("again", whole("figure", 3000))
+    assert briefs(path) == ["again"]
+    library.remove("figure")
+    assert library.names() == ("again",)
+
+
+@pytest.mark.slow
+def test_only_models_that_may_be_there_are_read_as_a_whole(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library = Library(path)
+    for name in ("bracket with pin", "frustum with fin"):
+        library.add(name, whole(name))
+    scene = finding_scene("figure", 2, copies=1, others=1)
+    read: list[tuple[str, bool]] = []
+
+    def reading(library: Library, name: str, is_brief: bool) -> Any:
+        read.append((name, is_brief))
+        return stored_model(library, name, is_brief)
+
+    monkeypatch.setattr("surfsig.finding.search.stored_model", reading)
+    (instance,) = surfsig.find_instances(library, scene.cloud).instances
+    assert errors(instance.T_scene_model, scene.poses[0])[0] < 0.001
+    assert [name for name, is_brief in read if is_brief] == list(library.names())
+    assert ("figure", False) in read
+    assert ("frustum with fin", False) not in read
+    # The same models in memory are the same models.
+    (same,) = surfsig.find_instances({name: library.get(name) for name in library.names()}, scene.cloud)
+    assert same.name == "figure"
+    np.testing.assert_allclose(same.T_scene_model, instance.T_scene_model, atol=1e-3)
+
+
+def test_a_damaged_brief_part_is_said(path: Path) -> None:
+    library = Library(path)
+    library.add("again", whole("figure", 3000))
+    with sqlite3.connect(path) as store:
+        store.execute("UPDATE briefs SET arrays = x'00'")
+    scene = finding_scene("figure", 2, copies=1, others=1)
+    with pytest.raises(surfsig.FileFormatError, match="damaged"):
+        surfsig.find_instances(library, scene.cloud)
+
+
 @pytest.mark.slow
 def test_the_commands_do_all_of_it(tmp_path: Path, shell: Any) -> None:
     scene = finding_scene("figure", 2, copies=1, others=1)

@@ -52,6 +52,10 @@ def find_instances(
     is left that is good enough. So half hidden instances are found, and where there is none, none is. The
     result is always the same.
 
+    Of several models, where the scene's viewpoint is known, each is first looked for briefly, by its largest
+    patches; only those that may be there are searched, and read from a library as a whole, a hundred at most
+    (`FindSettings.searched`).
+
     Parameters
     ----------
     model
