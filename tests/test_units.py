@@ -69,6 +69,17 @@ def test_finding_names_the_units() -> None:
         assert not len(surfsig.find_instances(larger, scene))
 
 
+@pytest.mark.slow
+def test_each_model_of_a_library_gave_a_warning_of_its_units() -> None:
+    scene, model = finding_scene("figure", 2, copies=1, others=1).cloud, whole("figure", 3000)
+    larger = {name: PointCloud(model.points * 1000.0) for name in ("a", "b", "c")}
+    with pytest.warns(UserWarning, match="nothing was found") as told:
+        assert not len(surfsig.find_instances(larger, scene))
+    (text,) = [str(one.message) for one in told]
+    assert text.startswith("nothing was found, and the model 'a' has points")
+    assert text.endswith("; 2 other models differ alike")
+
+
 def test_comparing_places_names_the_units(shell: Callable[..., Any], tmp_path: Path) -> None:
     points = scans()[0]
     metres, millimetres = tmp_path / "m.ply", tmp_path / "mm.ply"

@@ -129,12 +129,10 @@ def find_instances(
         values["alternatives"] = [np.array(pose) for pose in values["alternatives"]]
         instances.append(Instance(name=name, free_directions=free, indices=indices, **values))
     if not instances:
-        spacing = point_spacing(cloud.points)
-        for name, own_spacing in zip(names, models.spacings, strict=True):
-            relation = "has points {ratio} times as far apart as"
-            hint = ratio_text(own_spacing, spacing, (f"the model '{name}'", "the scene"), relation)
-            if hint is not None:
-                warnings.warn(f"nothing was found, and {hint}", stacklevel=2)
+        hints = _unit_hints(models, point_spacing(cloud.points))
+        if hints:
+            others = f"; {len(hints) - 1} other models differ alike" if len(hints) > 1 else ""
+            warnings.warn(f"nothing was found, and {hints[0]}{others}", stacklevel=2)
     whole = {instance.name: models.load(instance.name, False) for instance in instances}
     clouds = {name: PointCloud(part.points, part.center) for name, part in sorted(whole.items())}
     return Instances(instances, given, clouds, len(names))
@@ -150,6 +148,16 @@ class _Source(NamedTuple):
     """Between their points."""
     load: Callable[[str, bool], Model]
     """Gives a model by its name, and whether what `Model.brief` has is enough."""
+
+
+def _unit_hints(models: _Source, spacing: float) -> list[str]:
+    """Say which models seem to be in another unit than a scene whose points are so far apart."""
+    relation = "has points {ratio} times as far apart as"
+    told = (
+        ratio_text(own, spacing, (f"the model '{name}'", "the scene"), relation)
+        for name, own in zip(models.names, models.spacings, strict=True)
+    )
+    return [hint for hint in told if hint is not None]
 
 
 def _source(model: object, only: tuple[str, ...] | None, threads: int | None) -> _Source:

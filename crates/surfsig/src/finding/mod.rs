@@ -148,8 +148,11 @@ fn possible_models(
         }
     }
     possible.sort_by(|(_, a), (_, b)| b.total_cmp(a));
-    monitor.add((FIND_STEPS_PER_MODEL - 1) * possible.len().saturating_sub(settings.searched));
-    possible.truncate(settings.searched);
+    // Those of which it cannot tell are searched beside these.
+    let untold = possible.iter().filter(|(_, log_odds)| *log_odds == f64::INFINITY).count();
+    let most = settings.searched.saturating_add(untold);
+    monitor.add((FIND_STEPS_PER_MODEL - 1) * possible.len().saturating_sub(most));
+    possible.truncate(most);
     let mut numbers: Vec<usize> = possible.into_iter().map(|(number, _)| number).collect();
     numbers.sort_unstable();
     Ok(numbers)

@@ -83,7 +83,7 @@ impl<'a> ModelSearch<'a> {
     }
 
     /// The largest logarithm of the odds that a brief search for a model finds, of which [`Model::brief`] is given; infinite
-    /// where that cannot tell, as the scene has too few points.
+    /// where that cannot tell, as the scene has too few points, or it is not known which side of the model is the outer one.
     pub fn briefly(
         number: usize,
         brief: Cow<'a, Model>,

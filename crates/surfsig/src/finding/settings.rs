@@ -66,7 +66,8 @@ pub struct FindSettings {
     /// By how much the logarithm of the odds of the best of them may be below that of what is given up. With 0 it keeps 119 of
     /// the 125, and an eighth of those that are not there.
     pub brief_deficit: f64,
-    /// How many of several models are searched after it, at most: those with the largest odds.
+    /// How many of several models are searched after it, at most: those with the largest odds. Of 21 objects found in scenes of
+    /// a library of 200 (`benchmarks/clutter.py`, seeds 720 to 723) 16 are among its first 24, 19 among its first 80.
     pub searched: usize,
     /// Points of the model in their alignment.
     pub aligned_points: usize,

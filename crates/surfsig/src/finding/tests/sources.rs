@@ -70,6 +70,9 @@ fn only_models_that_may_be_there_are_loaded_and_the_same_is_found() {
     let least = FindSettings { brief_deficit: f64::INFINITY, ..settings.clone() };
     assert_eq!(find(&models, &least).1, [0, 1, 2]);
     assert_eq!(find(&models, &FindSettings { searched: 1, ..least }).1, [1]);
+    // Which are open of these, and may be either side out, it cannot tell.
+    let [open, closed] = [false, true].map(|is_sided| Model { is_sided, ..other.clone() });
+    assert_eq!(find(&[&open, &closed, &open], &FindSettings { searched: 0, ..settings.clone() }).1, [0, 2]);
     // Where it is not known what was seen through, each is searched.
     let unknown = Scan::new(PointCloud::new_f64(&points)).seen_from([0.0, 0.0, -2.6]);
     let source = Counted { models: InMemory(&models[..2]), loaded: Mutex::default() };
