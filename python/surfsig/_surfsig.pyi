@@ -32,6 +32,7 @@ __all__ = [
     "__version__",
     "added_sums",
     "align_pieces",
+    "brief_model",
     "consistent_directions",
     "coordinate_resolution",
     "coordinate_steps",
