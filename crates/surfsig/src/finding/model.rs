@@ -135,7 +135,7 @@ impl Model {
     }
 
     /// What tells whether the model may be in a scene: of its places those with the largest patches, and no points but the
-    /// samples. It takes a fifth of the memory; [`crate::ModelSource`] says what for.
+    /// samples. It takes some quarter of the memory; [`crate::ModelSource`] says what for.
     ///
     /// ```
     /// # use surfsig::{Model, Monitor, PointCloud, Scan};
