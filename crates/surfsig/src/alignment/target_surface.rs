@@ -5,6 +5,7 @@ use crate::kd_tree::KdTree;
 use crate::statistics::{DEVIATIONS_PER_MEDIAN, median};
 use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Nearest points of the target that its surface is fitted to.
 const NEIGHBORS: usize = 20;
@@ -28,8 +29,9 @@ pub(crate) struct TargetSurface {
     tree: KdTree,
     voxel: f64,
     /// Whether the surface around each point goes on beyond its nearest neighbours. Those may all lie on one scan
-    /// line, which in a corner lies in a plane of its own that is none of the scene's.
-    goes_on: Vec<bool>,
+    /// line, which in a corner lies in a plane of its own that is none of the scene's. Told when it is first asked for:
+    /// sources often meet a small part of a target.
+    goes_on: Vec<OnceLock<bool>>,
 }
 
 /// How far a point is above the surface, and what the surface there rests on.
@@ -50,15 +52,19 @@ pub(super) struct Residual {
 impl TargetSurface {
     /// Points spread evenly over the surface, about a voxel apart.
     pub fn new(points: Vec<[f64; 3]>, voxel: f64) -> Self {
-        let tree = KdTree::new(&points);
-        let goes_on = |found: &mut Vec<(f64, u32)>, point: &[f64; 3]| {
-            tree.nearest_k(*point, SURROUNDING, found);
+        let goes_on = (0..points.len()).map(|_| OnceLock::new()).collect();
+        Self { tree: KdTree::new(&points), points, voxel, goes_on }
+    }
+
+    /// See [`TargetSurface::goes_on`].
+    fn goes_on(&self, number: usize) -> bool {
+        *self.goes_on[number].get_or_init(|| {
+            let mut found = Vec::new();
+            self.tree.nearest_k(self.points[number], SURROUNDING, &mut found);
             let around: Vec<Vector3<f64>> =
-                found.iter().map(|&(_, index)| points[index as usize].into()).collect();
+                found.iter().map(|&(_, index)| self.points[index as usize].into()).collect();
             surface_goes_on(&around)
-        };
-        let goes_on = points.par_iter().with_min_len(PART).map_init(Vec::new, goes_on).collect();
-        Self { points, tree, voxel, goes_on }
+        })
     }
 
     pub fn points(&self) -> &[[f64; 3]] {
@@ -80,7 +86,7 @@ impl TargetSurface {
         self.tree.nearest_k(point, NEIGHBORS, found);
         let [(square, nearest), ..] = found[..] else { return None };
         let is_near = square < (settings.max_distance * self.voxel).powi(2);
-        if found.len() < NEIGHBORS || !is_near || !self.goes_on[nearest as usize] {
+        if found.len() < NEIGHBORS || !is_near || !self.goes_on(nearest as usize) {
             return None;
         }
         let mut neighbors = [0; NEIGHBORS];

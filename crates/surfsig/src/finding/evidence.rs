@@ -103,20 +103,8 @@ struct Seen {
 }
 
 impl<'a> ModelView<'a> {
-    /// Takes so many of a side's samples at most.
+    /// Takes so many of a side's samples at most. Without its rim it tells only what [`ModelView::supports`] gives.
     pub fn new(
-        side: &Side<'_>,
-        scene: Arc<SceneSurface>,
-        viewpoint: Option<[f64; 3]>,
-        most: usize,
-        settings: &'a FindSettings,
-    ) -> Self {
-        let view = Self::without_rim(side, scene, viewpoint, most, settings);
-        Self { rim: Rim::new(side, &view.samples, view.scene.voxel, view.scene.spacing), ..view }
-    }
-
-    /// The same, which tells only what [`ModelView::supports`] gives.
-    pub fn without_rim(
         side: &Side<'_>,
         scene: Arc<SceneSurface>,
         viewpoint: Option<[f64; 3]>,
@@ -146,6 +134,11 @@ impl<'a> ModelView<'a> {
             is_closed: side.is_closed,
             settings,
         }
+    }
+
+    /// The same, which judges where the model ends, too.
+    pub fn with_rim(self, side: &Side<'_>) -> Self {
+        Self { rim: Rim::new(side, &self.samples, self.scene.voxel, self.scene.spacing), ..self }
     }
 
     /// The same, which judges the model's front and its outline, too; of few samples neither has a picture.

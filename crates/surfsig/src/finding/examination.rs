@@ -39,9 +39,10 @@ impl Refined<'_> {
         let sought = &self.candidate.sought;
         let surface = sought.surface();
         let radius = sought.model.places.radius;
+        // In a few steps, as in registration: how much a rival explains hardly depends on the last of them.
         let fit = PointToSurfaceSettings {
             max_distance: settings.rival_distance * radius / sought.view.scene.voxel,
-            ..settings.point_to_surface
+            ..Default::default()
         };
         let rivals = Rivals {
             surface: FittedTarget { surface, farthest: self.fit.farthest, fit, is_hidden: &|_| false },
@@ -56,6 +57,7 @@ impl Refined<'_> {
             .into_iter()
             .map(|symmetry| symmetry * self.fit.T_target_source)
             .collect();
+
         // What the sensor saw through or did not see refutes a rival, too.
         let is_as_good = |transform: &RigidTransform| {
             let rival = Candidate { T_scene_model: *transform, ..self.candidate.clone() };

@@ -67,11 +67,12 @@ impl<'a> ModelSearch<'a> {
         monitor: &Monitor,
     ) -> Result<Self, Error> {
         let voxel = scene.voxel(&model)?;
+        let sought = model.places_sought(scene.viewpoint.is_some());
         let seen = |own: &FieldPlaces| match own.is_empty() {
             true => Ok(Arc::new(FieldPlaces::new(own.radius))),
             false => scene.places(own.radius),
         };
-        let places = model.all_places().map(seen).collect::<Result<_, _>>()?;
+        let places = sought.iter().map(seen).collect::<Result<_, _>>()?;
         let fine = scene.fine_surface(voxel)?;
         let coarse = scene.coarse_surface(voxel, settings.coarse_voxels * voxel)?;
         let rough = on_ladder(settings.rough_voxel * model.extent()).max(coarse.voxel);
@@ -142,35 +143,49 @@ impl<'a> ModelSearch<'a> {
     }
 
     /// The best transforms of a side, by most of its points; `None` where nothing speaks for any.
+    ///
+    /// Where the viewpoint is known, those that the coarse surface says may be right are looked at first. If one of them is,
+    /// the others are its rivals.
     fn judged(&self, side: &Side<'_>, effort: Effort) -> Option<Judged<'a>> {
         let settings = self.settings;
-        let view = self.view(side, &self.coarse, settings.coarse_points);
-        let aligned: Vec<RigidTransform> = if self.viewpoint.is_some() {
+        let view = self.view(side, &self.coarse, settings.coarse_points).with_rim(side);
+        let (aligned, least) = if self.viewpoint.is_some() {
             let agreed = self.most_supported(&view, side, effort);
-            best_first(&view, &agreed, &[settings.first_distances, settings.coarse_distances]).collect()
+            let distances = [settings.first_distances, settings.coarse_distances];
+            (best_first(&view, &agreed, &distances), least_before_fit(settings))
         } else {
             // The first alignment was made by fewer points.
-            best_first(&view, &self.most_agreed(side), &[settings.coarse_distances]).collect()
+            (best_first(&view, &self.most_agreed(side), &[settings.coarse_distances]), f64::NEG_INFINITY)
         };
-        let tried = self.different(side, aligned.into_iter(), effort.tried);
-        if tried.is_empty() {
+        let promising = aligned.partition_point(|(_, log_odds)| *log_odds >= least);
+        let different = |most: usize| self.different(side, transforms_of(&aligned[..most]), effort.tried);
+        let (promising, tried) = (different(promising), different(aligned.len()));
+        if promising.is_empty() {
             return None;
         }
-        let view = self.view(side, &self.fine, effort.points).with_front(&side.model);
-        let transforms = view.aligned(&tried, settings.fine_distances, settings.aligned_points);
-        let evidence = view.judged(&transforms, Free::All);
+        let view = self.view(side, &self.fine, effort.points).with_rim(side).with_front(&side.model);
+        let judged = |tried: &[RigidTransform]| {
+            let transforms = view.aligned(tried, settings.fine_distances, settings.aligned_points);
+            let evidence = view.judged(&transforms, Free::All);
+            (transforms, evidence)
+        };
+        let (mut transforms, mut evidence) = judged(&promising);
+        if evidence.iter().any(|one| one.log_odds >= least) {
+            let (others, of_others) = judged(&tried[promising.len()..]);
+            transforms.extend(others);
+            evidence.extend(of_others);
+        }
         Some(Judged { view, transforms, evidence })
     }
 
     /// Where the viewpoint is known: of all transforms that matches propose, those that what the sensor saw speaks for, and
     /// most others agree with.
     fn most_supported(&self, view: &ModelView<'_>, side: &Side<'_>, effort: Effort) -> Vec<RigidTransform> {
-        let matched = side.model.all_places().zip(&self.places);
+        let own = |seen: &FieldPlaces| side.model.all_places().find(|own| own.radius == seen.radius);
+        let matched = self.places.iter().filter_map(|seen| Some((own(seen)?, seen)));
         let weighted: Vec<(RigidTransform, f64)> =
             matched.flat_map(|(own, seen)| weighted_transforms(own, seen, self.settings.similar)).collect();
-        let rough = Arc::clone(&self.rough);
-        let rough =
-            ModelView::without_rim(side, rough, self.viewpoint, self.settings.few_points, self.settings);
+        let rough = self.view(side, &self.rough, self.settings.few_points);
         let transforms: Vec<RigidTransform> = weighted.iter().map(|(one, _)| *one).collect();
         let supports = rough.supports(&transforms);
         let supported = weighted.into_iter().zip(supports).filter(|(_, support)| *support > 0.0);
@@ -189,9 +204,9 @@ impl<'a> ModelSearch<'a> {
         let proposed =
             Proposals::of_best_matches(&side.model.places, &self.places[0], self.settings).most_agreed();
         let proposed: Vec<RigidTransform> = proposed.into_iter().map(|(one, _)| one).collect();
-        let view = self.view(side, &self.coarse, self.settings.first_points);
+        let view = self.view(side, &self.coarse, self.settings.first_points).with_rim(side);
         let aligned = best_first(&view, &proposed, &[self.settings.first_distances]);
-        self.different(side, aligned, self.settings.kept)
+        self.different(side, transforms_of(&aligned), self.settings.kept)
     }
 
     fn view(&self, side: &Side<'_>, surface: &Arc<SceneSurface>, most: usize) -> ModelView<'a> {
@@ -214,13 +229,17 @@ fn least_radius(scene: &Scene<'_>) -> f64 {
     SPACINGS_PER_RADIUS * scene.spacing
 }
 
+fn transforms_of(aligned: &[(RigidTransform, f64)]) -> impl Iterator<Item = RigidTransform> {
+    aligned.iter().map(|(transform, _)| *transform)
+}
+
 /// Transforms that anything speaks for, aligned by the samples of a view, by one range of distances after the other, where
-/// that is better; the best first.
+/// that is better, with the logarithm of their odds; the best first.
 fn best_first(
     view: &ModelView<'_>,
     transforms: &[RigidTransform],
     distances: &[(f64, f64, usize)],
-) -> impl Iterator<Item = RigidTransform> + use<> {
+) -> Vec<(RigidTransform, f64)> {
     let judged = |transforms: &[RigidTransform]| view.judged(transforms, Free::All);
     let aligned = distances
         .iter()
@@ -235,5 +254,5 @@ fn best_first(
     }
     all.retain(|(_, evidence)| evidence.support > 0.0);
     all.sort_by(|(_, a), (_, b)| b.log_odds.total_cmp(&a.log_odds));
-    all.into_iter().map(|(transform, _)| transform)
+    all.into_iter().map(|(transform, evidence)| (transform, evidence.log_odds)).collect()
 }

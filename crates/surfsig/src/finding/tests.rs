@@ -203,7 +203,8 @@ fn evidence_without_a_viewpoint_is_what_touches() {
     let model = model_of(body(1500));
     let scene: Vec<_> = body(4000).into_iter().filter(|(point, _)| point[0] + point[2] > 0.0).collect();
     let (voxel, scene) = (0.12, model_of(scene));
-    let view = ModelView::new(&side(&model), surface_of(&scene, voxel), None, usize::MAX, &settings);
+    let view = ModelView::new(&side(&model), surface_of(&scene, voxel), None, usize::MAX, &settings)
+        .with_rim(&side(&model));
     let off = RigidTransform::from_rotation_vector([0.01, 0.0, -0.02], [0.02, 0.01, 0.0]);
     let [there, far] =
         view.judged(&[off, RigidTransform::from_rotation_vector([0.0; 3], [9.0, 0.0, 0.0])], Free::All)[..]
@@ -313,7 +314,8 @@ fn what_is_round_is_not_determined_and_a_front_ends_where_nothing_is_beyond() {
         let seen = model_of(all.iter().filter(|(_, normal)| normal.z > 0.3).copied().collect());
         let model = model_of(all);
         let view =
-            ModelView::new(&side(&model), surface_of(&seen, voxel), Some(viewpoint), usize::MAX, &settings);
+            ModelView::new(&side(&model), surface_of(&seen, voxel), Some(viewpoint), usize::MAX, &settings)
+                .with_rim(&side(&model));
         let judge = |view: &ModelView<'_>| view.judged(&[RigidTransform::identity()], Free::All)[0].measures;
         assert_eq!(judge(&view).pixels, 0.0, "few samples have no front");
         judge(&view.with_front(&model))

@@ -36,7 +36,7 @@ fn rivals_explain_the_same_or_are_elsewhere_and_symmetries_are_none() {
             .flat_map(|&(point, normal)| [0.0, 20.0].map(|x| (at(x, 0.0).transform_point(point), normal)));
         let scene = surface_of(&model_of(twice.collect()), voxel);
         let model = model_of(all);
-        let view = ModelView::new(&side(&model), scene, None, usize::MAX, &settings);
+        let view = ModelView::new(&side(&model), scene, None, usize::MAX, &settings).with_rim(&side(&model));
         let sought = Sought::new(0, model, view);
         // There, a little off, after half a turn, and the copy.
         let transforms = [at(0.0, 0.0), at(0.05, 0.02), at(0.0, PI), at(20.0, 0.0)];
@@ -92,7 +92,7 @@ fn an_egg_of_nearly_the_shape_of_the_model_was_found() {
     let model = model_of(body(4000));
     let [same, longer] = [1.0, 1.06].map(|stretch| {
         let scene = seen(stretch);
-        let view = ModelView::new(&side(&model), scene, None, usize::MAX, &settings);
+        let view = ModelView::new(&side(&model), scene, None, usize::MAX, &settings).with_rim(&side(&model));
         let judged = view.judged(&[RigidTransform::identity()], Free::All)[0].among_rivals(-5.0, false);
         (judged.measures.misfit, judged.log_odds)
     });
@@ -111,7 +111,8 @@ fn a_fit_left_the_place_that_was_judged() {
         None,
         usize::MAX,
         &settings,
-    );
+    )
+    .with_rim(&side(&model));
     let start = RigidTransform::from_rotation_vector([0.01, -0.02, 0.01], [0.01, 0.0, 0.02]);
     let candidate = Candidate {
         evidence: view.judged(&[start], Free::All)[0].among_rivals(-12.0, false),

@@ -14,7 +14,8 @@ fn free_space_speaks_against_what_is_not_there() {
     let surface = prepared.fine_surface(0.15).unwrap();
     let center = RigidTransform::from_rotation_vector([0.0; 3], prepared.scan.center);
     let about = |pose: RigidTransform| center.inverse() * pose;
-    let view = ModelView::new(&side(&model), Arc::clone(&surface), prepared.viewpoint, usize::MAX, &settings);
+    let view = ModelView::new(&side(&model), Arc::clone(&surface), prepared.viewpoint, usize::MAX, &settings)
+        .with_rim(&side(&model));
     let above = RigidTransform::from_rotation_vector([0.4, -1.0, 0.7], [-2.5, 0.3, 2.0]);
     let transforms = [about(poses[0]), about(poses[1]), about(above)];
     let judged = view.judged(&transforms, Free::All);
@@ -25,7 +26,8 @@ fn free_space_speaks_against_what_is_not_there() {
     let supports = view.supports(&transforms);
     // Images that are kept for all models are larger, and say nearly the same, the second time exactly.
     let kept = prepared.rough_surface(0.15, 0.15).unwrap();
-    let of_kept = ModelView::new(&side(&model), kept, prepared.viewpoint, usize::MAX, &settings);
+    let of_kept = ModelView::new(&side(&model), kept, prepared.viewpoint, usize::MAX, &settings)
+        .with_rim(&side(&model));
     let [first, second] = [0, 1].map(|_| of_kept.supports(&transforms));
     assert_eq!(first, second);
     assert!(
@@ -51,7 +53,8 @@ fn what_was_far_before_and_behind_a_model_was_not_looked_at() {
     };
     let support_with = |square: Model| {
         let surface = surface_of(&square, voxel);
-        let view = ModelView::new(&side(&model), surface, Some(viewpoint), usize::MAX, &settings);
+        let view = ModelView::new(&side(&model), surface, Some(viewpoint), usize::MAX, &settings)
+            .with_rim(&side(&model));
         view.supports(&[RigidTransform::identity()])[0]
     };
     // Confirmed samples, less five times those that were seen through.
@@ -75,7 +78,8 @@ fn a_thread_waited_for_itself_while_the_first_images_were_made() {
         .collect();
     let supports = |threads| {
         with_threads(Some(threads), || {
-            let view = ModelView::new(&side(&model), surface(), Some(viewpoint), usize::MAX, &settings);
+            let view = ModelView::new(&side(&model), surface(), Some(viewpoint), usize::MAX, &settings)
+                .with_rim(&side(&model));
             view.supports(&transforms)
         })
         .unwrap()

@@ -117,3 +117,34 @@ fn what_a_source_says_is_told() {
     let told = find_instances_of(&Broken, &scan, &FindSettings::default(), &Monitor::default());
     assert_eq!(told.unwrap_err(), Error::InvalidModel("gone".into()));
 }
+
+#[test]
+fn an_instance_has_the_same_rivals_whatever_is_given_up() {
+    let viewpoint = [0.5, -3.0, 14.0];
+    let (points, _) = scene(viewpoint);
+    let model = prepared(&body(5000).into_iter().map(|(point, _)| point).collect::<Vec<_>>());
+    let scan = Scan::new(PointCloud::new_f64(&points)).seen_from(viewpoint);
+    let found = |min_score: f64| {
+        let settings = FindSettings { min_score, ..Default::default() };
+        find_instances(&[&model], &scan, &settings, &Monitor::default()).unwrap()
+    };
+    // With so small a probability every transform that is aligned is tried at once.
+    let (few, all) = (found(0.5), found(1e-9));
+    assert_eq!(few.len(), 2);
+    assert_eq!(few[..], all[..2]);
+}
+
+#[test]
+fn the_smallest_patches_are_looked_for_where_nothing_else_tells() {
+    let mut model = prepared(&body(3000).into_iter().map(|(point, _)| point).collect::<Vec<_>>());
+    let radii = |model: &Model, is_free_space_known: bool| -> Vec<f64> {
+        model.places_sought(is_free_space_known).iter().map(|places| places.radius).collect()
+    };
+    let radius = model.places.radius;
+    assert_eq!(radii(&model, false), [radius]);
+    let ratios: Vec<f64> = radii(&model, true).iter().map(|other| other / radius).collect();
+    assert!((ratios[0] - 2.0_f64.sqrt()).abs() < 1e-9 && (ratios[1] - 2.0).abs() < 1e-9, "{ratios:?}");
+    // Of a small bend in a plane large patches are flat.
+    model.larger_places.iter_mut().for_each(|places| *places = FieldPlaces::new(places.radius));
+    assert_eq!(radii(&model, true), [radius]);
+}
