@@ -11,6 +11,8 @@ use super::observability::{FreeDirection, Motions, UNOBSERVABLE};
 use super::point_to_surface::PointToSurface;
 use super::rivals::RivalSettings;
 use nalgebra::Vector3;
+use std::borrow::Borrow;
+use std::cell::LazyCell;
 
 /// Voxels within which the normal of a voxel is that of a point: its own or a neighbouring one.
 const REACH: f64 = 2.0;
@@ -62,10 +64,10 @@ impl IndependentNormals {
 impl PointToSurface {
     /// Motions that the inliers do not determine, in the target: along some the surface slides over itself, along others,
     /// which are weak, only errors of normals would hold it. Normals are those of the source and the target, of which
-    /// each has one point for a voxel.
-    pub fn free_directions(
+    /// each has one point for a voxel; they are asked for only where some motion is weak.
+    pub fn free_directions<C: Borrow<[GicpCloud; 2]>>(
         &self,
-        [source, target]: &[GicpCloud; 2],
+        clouds: impl FnOnce() -> C,
         voxel: f64,
         settings: &RivalSettings,
     ) -> Vec<FreeDirection> {
@@ -73,14 +75,17 @@ impl PointToSurface {
         let limits = HeldLimits { share: settings.held_share, deviations: settings.held_deviations };
         let motions = Motions::new(&self.points, &self.normals);
         let to_source = self.T_target_source.inverse();
-        let normals_at = |(point, used): (&[f64; 3], &[f64; 3])| {
-            let ours = source.surface(source.nearest(to_source.transform_point(*point), reach)?).1;
-            let theirs = target.surface(target.nearest(*point, reach)?).1;
-            let independent = [self.T_target_source.transform_vector(ours), theirs];
-            Some(PlaceNormals { point: *point, used: *used, independent })
-        };
-        let inliers = self.points.iter().zip(&self.normals);
-        let both = IndependentNormals::new(inliers.filter_map(normals_at));
+        let both = LazyCell::new(|| {
+            let clouds = clouds();
+            let [source, target] = clouds.borrow();
+            let normals_at = |(point, used): (&[f64; 3], &[f64; 3])| {
+                let ours = source.surface(source.nearest(to_source.transform_point(*point), reach)?).1;
+                let theirs = target.surface(target.nearest(*point, reach)?).1;
+                let independent = [self.T_target_source.transform_vector(ours), theirs];
+                Some(PlaceNormals { point: *point, used: *used, independent })
+            };
+            IndependentNormals::new(self.points.iter().zip(&self.normals).filter_map(normals_at))
+        });
         motions.named(|sliding, number| {
             sliding <= UNOBSERVABLE
                 || sliding <= settings.weak && !both.hold(|point| motions.velocity(number, point), limits)
@@ -115,7 +120,7 @@ mod tests {
         let settings = PointToSurfaceSettings::default();
         let found = surface.align(&source, RigidTransform::identity(), &settings).expect("it was at the end");
         let clouds = [source, target].map(GicpCloud::new);
-        found.free_directions(&clouds, 1.0, &RivalSettings::default())
+        found.free_directions(|| clouds, 1.0, &RivalSettings::default())
     }
 
     #[test]

@@ -69,8 +69,8 @@ impl Refined<'_> {
             .map(|(transform, _)| transform.inverse())
             .filter(is_as_good)
             .collect();
-        let clouds = [self.sample.clone(), surface.points().to_vec()].map(GicpCloud::new);
-        let free_directions = self.fit.free_directions(&clouds, sought.view.scene.voxel, &settings.rivals);
+        let clouds = || [self.sample.clone(), surface.points().to_vec()].map(GicpCloud::new);
+        let free_directions = self.fit.free_directions(clouds, sought.view.scene.voxel, &settings.rivals);
         let limits = ScaleLimits { doubted: settings.doubted_scale, deviations: settings.scale_deviations };
         let (scale, doubt) = rivals.surface.scale(&moved, &best, limits);
         let mut doubts: Vec<Doubt> = doubt.into_iter().collect();

@@ -53,7 +53,10 @@ pub struct FindSettings {
     /// Voxels of both judgements, in those of the last.
     pub coarse_voxels: f64,
     /// Transforms that are aligned and judged by most points. Of one instance the right one is among the first 9 wherever it
-    /// is among 60; of five half hidden copies of two models 43 of 80 are found with 20, 48 with 60.
+    /// is among 60; of five half hidden copies of two models 43 of 80 are found with 20, 48 with 60. Where the viewpoint is
+    /// known, those with too small odds by the coarse alignment are tried only if another one is good enough, as its rivals:
+    /// of the 166 objects 138 have a right one among 12,737 that are tried, and none of them is among the two thirds with
+    /// odds below -2.
     pub tried: usize,
     /// In the brief search that tells whether one of several models may be there: of the transforms that matches of its largest
     /// patches propose, how many are aligned. Of 125 objects that are found in clutter (`benchmarks/clutter.py`, the same seeds)

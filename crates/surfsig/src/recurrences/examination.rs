@@ -192,8 +192,8 @@ impl PiecePair<'_> {
         let at_pose = PointToSurfaceSettings { max_iterations: 0, ..settings.point_to_surface };
         let places = self.source.places(settings.surface_points);
         if let Some(found) = surface.align(&places, *T_target_source, &at_pose) {
-            let clouds = [places, surface.points().to_vec()].map(GicpCloud::new);
-            return found.free_directions(&clouds, surface.voxel(), &settings.rivals);
+            let clouds = || [places, surface.points().to_vec()].map(GicpCloud::new);
+            return found.free_directions(clouds, surface.voxel(), &settings.rivals);
         }
         // Pieces too small for that.
         let rows = self.residuals(T_target_source, settings.surface_points).into_iter();

@@ -102,7 +102,7 @@ impl Judge<'_> {
         let mut judged = Judgement {
             better: alternatives.iter().find(is_better).map(|rival| rival.T_target_source),
             doubts: Vec::new(),
-            free_directions: found.free_directions(self.clouds, self.voxel, &settings.rivals),
+            free_directions: found.free_directions(|| self.clouds, self.voxel, &settings.rivals),
             alternatives,
             explained: best.share(),
             free_space,
