@@ -57,7 +57,6 @@ impl Refined<'_> {
             .into_iter()
             .map(|symmetry| symmetry * self.fit.T_target_source)
             .collect();
-
         // What the sensor saw through or did not see refutes a rival, too.
         let is_as_good = |transform: &RigidTransform| {
             let rival = Candidate { T_scene_model: *transform, ..self.candidate.clone() };
