@@ -210,3 +210,13 @@ def test_true_poses_were_lost_where_a_fit_left_them(seed: int, number: int) -> N
     assert len(found) == 1
     true = scene.poses[list(scene.numbers).index(number)]
     assert pose_error(found[0].T_scene_model, true, number) < 0.05
+
+
+@pytest.mark.slow
+def test_rivals_count_although_the_coarse_surface_refutes_them() -> None:
+    cloud = clutter_scene(726).cloud
+    # With so small a probability all transforms are judged by the fine surface, whatever the coarse one says.
+    few, all_of_them = (surfsig.find_instances(solid(3), cloud, score=score) for score in (0.5, 1e-9))
+    assert len(few) == 1
+    assert few.instances[0].score == all_of_them.instances[0].score
+    assert few.instances[0].measures["margin_over_rivals"] < 8.0

@@ -119,22 +119,6 @@ fn what_a_source_says_is_told() {
 }
 
 #[test]
-fn an_instance_has_the_same_rivals_whatever_is_given_up() {
-    let viewpoint = [0.5, -3.0, 14.0];
-    let (points, _) = scene(viewpoint);
-    let model = prepared(&body(5000).into_iter().map(|(point, _)| point).collect::<Vec<_>>());
-    let scan = Scan::new(PointCloud::new_f64(&points)).seen_from(viewpoint);
-    let found = |min_score: f64| {
-        let settings = FindSettings { min_score, ..Default::default() };
-        find_instances(&[&model], &scan, &settings, &Monitor::default()).unwrap()
-    };
-    // With so small a probability every transform that is aligned is tried at once.
-    let (few, all) = (found(0.5), found(1e-9));
-    assert_eq!(few.len(), 2);
-    assert_eq!(few[..], all[..2]);
-}
-
-#[test]
 fn the_smallest_patches_are_looked_for_where_nothing_else_tells() {
     let mut model = prepared(&body(3000).into_iter().map(|(point, _)| point).collect::<Vec<_>>());
     let radii = |model: &Model, is_free_space_known: bool| -> Vec<f64> {
